@@ -1,0 +1,1 @@
+//! Closed forms on points and poses.

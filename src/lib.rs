@@ -1,0 +1,11 @@
+//! Learns one generative model of a robot, its features and its cameras from a recording: joints -> poses -> 3D features ->
+//! pixels.
+pub mod camera;
+pub mod chain;
+mod error;
+pub mod geometry;
+pub mod recording;
+pub mod rig;
+
+pub use error::Error;
+pub use handeye_solvers as solvers;

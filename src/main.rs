@@ -1,0 +1,2 @@
+//! The command `handeye`.
+fn main() {}

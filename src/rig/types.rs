@@ -1,0 +1,183 @@
+//! A rig in memory. `None` is unknown; what is given is a known value or a starting point.
+use crate::camera::CameraModel;
+use crate::chain::{Convention, JointKind};
+use handeye_solvers::Pose;
+use std::collections::BTreeMap;
+
+/// A robot, the cameras that watch it and the features that they track. Units: m, rad, s, px.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Rig {
+    /// What its author calls it.
+    pub name: Option<String>,
+    /// The arm.
+    pub robot: Robot,
+    /// The cameras, in the file's order.
+    pub cameras: Vec<Camera>,
+    /// The features, in the file's order.
+    pub features: Vec<Feature>,
+    /// Standard deviations of what is measured and commanded.
+    pub noise: Noise,
+    /// What is held, and what is known only roughly.
+    pub estimate: Estimate,
+    /// How it was learned, where it was.
+    pub fit: Option<Fit>,
+}
+
+/// The arm. A rig without joints takes their number from the recording.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Robot {
+    /// How a row of parameters makes a link.
+    pub convention: Convention,
+    /// `world_from_base`.
+    pub base: Option<Pose>,
+    /// The joints, from base to tip.
+    pub joints: Vec<Joint>,
+}
+
+/// One joint and the link behind it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Joint {
+    /// Its name.
+    pub name: String,
+    /// Revolute or prismatic.
+    pub kind: JointKind,
+    /// Added to the reading of a revolute joint; the constant angle of a prismatic one [rad].
+    pub offset: Option<f64>,
+    /// Link offset [m]; the reading of a prismatic joint is added to it.
+    pub d: Option<f64>,
+    /// Link length [m].
+    pub a: Option<f64>,
+    /// Link twist [rad].
+    pub alpha: Option<f64>,
+    /// Hayati's extra rotation about y [rad]; `None` where the joint has none, which is 0.
+    pub beta: Option<f64>,
+    /// True where the reading counts against the axis.
+    pub reversed: bool,
+    /// How far and how fast it may move.
+    pub limits: Limits,
+}
+
+/// Limits of a joint [rad, rad/s, rad/s², or m in place of rad]; `None` is unlimited or unknown.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Limits {
+    /// Smallest reading.
+    pub lower: Option<f64>,
+    /// Largest reading.
+    pub upper: Option<f64>,
+    /// Largest speed.
+    pub velocity: Option<f64>,
+    /// Largest acceleration.
+    pub acceleration: Option<f64>,
+}
+
+/// What a camera or a feature is fixed to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Parent {
+    /// The world.
+    #[default]
+    World,
+    /// The link of the joint with this index.
+    Link(usize),
+    /// The last link.
+    Tip,
+}
+
+/// One camera.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Camera {
+    /// Its name.
+    pub name: String,
+    /// Width and height of its images [px].
+    pub size: Option<[u32; 2]>,
+    /// Its lens model; `None` where the file does not say (a pinhole, or what the recording's header says).
+    pub model: Option<CameraModel>,
+    /// Focal length along u [px].
+    pub fx: Option<f64>,
+    /// Focal length along v [px].
+    pub fy: Option<f64>,
+    /// Principal point, u [px].
+    pub cx: Option<f64>,
+    /// Principal point, v [px].
+    pub cy: Option<f64>,
+    /// Distortion coefficients; fewer than the model has are followed by zeros.
+    pub distortion: Option<Vec<f64>>,
+    /// What it is fixed to.
+    pub parent: Parent,
+    /// `parent_from_camera`.
+    pub pose: Option<Pose>,
+}
+
+/// One feature. The default parent is the tip.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Feature {
+    /// Its name.
+    pub name: String,
+    /// What it is fixed to.
+    pub parent: Parent,
+    /// Its coordinates in the parent's frame [m].
+    pub xyz: Option<[f64; 3]>,
+}
+
+/// Standard deviations. 0 for joints and poses: readings are exact; for actions: nothing was commanded or they are exact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// Of a pixel coordinate [px].
+    pub pixels: f64,
+    /// Of a joint reading [rad or m].
+    pub joints: f64,
+    /// Of a recorded tip pose.
+    pub pose: PoseNoise,
+    /// Of a commanded joint motion [rad or m].
+    pub joint_action: f64,
+    /// Of a commanded tip motion.
+    pub pose_action: PoseNoise,
+}
+
+/// Standard deviation of a pose, per axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PoseNoise {
+    /// Of each coordinate of the translation [m].
+    pub xyz: f64,
+    /// Of each coordinate of the rotation vector [rad].
+    pub rot: f64,
+}
+
+impl Default for Noise {
+    fn default() -> Self {
+        Noise {
+            pixels: 0.5,
+            joints: 0.0,
+            pose: PoseNoise::default(),
+            joint_action: 0.0,
+            pose_action: PoseNoise::default(),
+        }
+    }
+}
+
+/// What is held and what is known roughly, by parameter path (globs as in the rig file).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// Paths of parameters that are held at their given values.
+    pub fixed: Vec<String>,
+    /// Standard deviation of a Gaussian prior around the given value, by path.
+    pub prior: BTreeMap<String, f64>,
+}
+
+/// How a learned rig was learned.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Fit {
+    /// Samples used.
+    pub samples: usize,
+    /// Detections used.
+    pub observations: usize,
+    /// Detections left out as wrong.
+    pub rejected: usize,
+    /// Root mean square of the pixel distances [px].
+    pub rms_px: f64,
+    /// Mean pixel distance [px].
+    pub mean_px: f64,
+    /// What the data cannot determine, in words, and how it was fixed.
+    pub gauge: Vec<String>,
+    /// Standard deviation of every learned scalar by parameter path; poses and points have 6 and 3 numbers.
+    pub sd: BTreeMap<String, Vec<f64>>,
+}
