@@ -1,11 +1,33 @@
 //! Factor graphs on manifolds with forward-mode automatic differentiation, and the solvers that minimise them.
 //!
 //! Knows no robot, no camera and no file: see the crate `handeye` for those.
+mod accumulate;
 mod error;
+mod factor;
+mod graph;
+mod jacobian;
+mod layout;
+mod levenberg_marquardt;
+pub mod linear;
+mod loss;
 pub mod manifold;
+mod noise;
+mod pool;
+mod report;
 pub mod scalar;
+mod variables;
+mod workspace;
 
 pub use error::Error;
+pub use factor::{Factor, Function};
+pub use graph::{FactorKey, FactorSettings, Graph};
+pub use jacobian::Jacobian;
+pub use levenberg_marquardt::{LevenbergMarquardt, Solver};
+pub use loss::Loss;
 pub use manifold::{Direction, DynamicVector, Pose, Rotation, Variable, Vector};
 pub use nalgebra;
+pub use noise::Noise;
+pub use report::{Iteration, Observer, Report, Termination};
 pub use scalar::Scalar;
+pub use variables::{Key, Variables};
+pub use workspace::Workspace;

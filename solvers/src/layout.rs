@@ -1,0 +1,382 @@
+//! Where every block of the normal equations lives, found once per structure and reused by every pass.
+//!
+//! Factors that meet in derived nodes belong together, because a derived node is substituted once all of its factors are in.
+//! Such groups are packed into *chunks*, each of about the same work. A node that only one chunk touches has its blocks in
+//! that chunk's own arena; blocks between nodes that several chunks touch are in a shared arena, of which each chunk
+//! fills its own copy, summed in a fixed order. The chunks depend on the graph alone, so the sum does too, on any number of
+//! threads.
+use crate::accumulate::{Offset, Place};
+use crate::graph::{Graph, Role};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+/// Factors in a chunk, at least: about half a millisecond of work.
+const CHUNK: usize = 1024;
+
+pub(crate) struct Layout {
+    pub places: Vec<Place>,
+    pub chunks: Vec<Chunk>,
+    /// Length of the shared arena.
+    pub shared: usize,
+    /// Free nodes with at least one free coordinate, in order: (node, first column in the system).
+    pub free: Vec<(u32, usize)>,
+    /// The chunk whose arena a free node's part of b is in, if its offset is private.
+    pub gradient_chunks: Vec<u32>,
+    /// Columns of the system.
+    pub columns: usize,
+    /// Blocks between free nodes, (row node, column node) with row <= column, in order.
+    pub blocks: Vec<Block>,
+}
+
+/// A block of the system that remains once derived nodes are substituted.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Block {
+    pub row: u32,
+    pub column: u32,
+    /// The chunk whose arena it is in, if its offset is private.
+    pub chunk: u32,
+    pub offset: Offset,
+}
+
+/// Part of the graph that one thread works through.
+#[derive(Default)]
+pub(crate) struct Chunk {
+    /// Consecutive factors of one pool.
+    pub runs: Vec<(u32, Range<usize>)>,
+    /// Blocks of the factors, in the order of the runs.
+    pub offsets: Vec<Offset>,
+    /// Derived nodes, in order of creation.
+    pub functions: Vec<FunctionPlan>,
+    /// Length of the chunk's own arena, and of its derived values.
+    pub private: usize,
+    pub derived: usize,
+}
+
+/// How one derived node is evaluated and substituted.
+pub(crate) struct FunctionPlan {
+    pub pool: u32,
+    pub place: u32,
+    pub node: u32,
+    /// Its Jacobian G (rows: its step, columns: free coordinates of its parents) in the chunk's arena.
+    pub jacobian: usize,
+    /// Its own block of H.
+    pub diagonal: Offset,
+    /// Blocks between its parents: one per pair (a, b) with a <= b, NONE where one is held.
+    pub parents: Vec<Offset>,
+    /// Nodes that it shares factors with: the block with each, and that node's block with each parent.
+    pub neighbours: Vec<(u32, Offset, Vec<Offset>)>,
+}
+
+impl Layout {
+    pub fn new(graph: &Graph) -> Self {
+        let mut places = places(graph);
+        let (chunk_of_factor, chunk_of_derived, chunk_count) = chunks(graph);
+        let owner = owners(graph, &places, &chunk_of_factor, &chunk_of_derived);
+        let mut builder =
+            Builder { places: &mut places, owner, shared: BTreeMap::new(), shared_len: 0, blocks: Vec::new() };
+        for (node, _) in graph.nodes.iter().enumerate() {
+            if builder.owner[node] == Owner::Shared && builder.places[node].active > 0 {
+                builder.places[node].gradient = Offset::shared(builder.shared_len);
+                builder.shared_len += usize::from(builder.places[node].active);
+            }
+        }
+        let mut members: Vec<(Vec<usize>, Vec<usize>)> = vec![Default::default(); chunk_count];
+        for (factor, &chunk) in chunk_of_factor.iter().enumerate() {
+            members[chunk].0.push(factor);
+        }
+        for (derived, &chunk) in chunk_of_derived.iter().enumerate() {
+            if let Some(chunk) = chunk {
+                members[chunk].1.push(derived);
+            }
+        }
+        let chunks = members
+            .iter()
+            .enumerate()
+            .map(|(c, (factors, derived))| builder.chunk(graph, c, factors, derived))
+            .collect();
+        let (shared, mut blocks) = (builder.shared_len, std::mem::take(&mut builder.blocks));
+        for (&(row, column), &offset) in &builder.shared {
+            blocks.push(Block { row, column, chunk: u32::MAX, offset });
+        }
+        let is_free = |node: u32| graph.nodes[node as usize].role == Role::Free;
+        blocks.retain(|block| is_free(block.row) && is_free(block.column));
+        blocks.sort_unstable_by_key(|block| (block.column, block.row));
+        let owner = builder.owner;
+        let mut columns = 0;
+        let mut free = Vec::new();
+        let mut gradient_chunks = Vec::new();
+        for (node, place) in places.iter().enumerate() {
+            if graph.nodes[node].role == Role::Free && place.active > 0 && place.gradient != Offset::NONE {
+                free.push((node as u32, columns));
+                gradient_chunks.push(match owner[node] {
+                    Owner::Chunk(chunk) => chunk as u32,
+                    _ => u32::MAX,
+                });
+                columns += usize::from(place.active);
+            }
+        }
+        Layout { places, chunks, shared, free, gradient_chunks, columns, blocks }
+    }
+
+    /// First column of a free node in the system.
+    pub fn column(&self, node: u32) -> usize {
+        let place = self.free.binary_search_by_key(&node, |&(node, _)| node).expect("the node is in the system");
+        self.free[place].1
+    }
+}
+
+fn places(graph: &Graph) -> Vec<Place> {
+    let mut places: Vec<Place> = Vec::with_capacity(graph.nodes.len());
+    for node in &graph.nodes {
+        let active = match node.role {
+            Role::Held => 0,
+            Role::Free => node.free.as_ref().map_or(node.tangent, Vec::len),
+            // A function of held nodes alone is a constant.
+            Role::Derived(derived) => {
+                let constant = parents(graph, derived).iter().all(|&parent| places[parent as usize].active == 0);
+                if constant { 0 } else { node.tangent }
+            }
+        };
+        places.push(Place {
+            derived: matches!(node.role, Role::Derived(_)),
+            start: node.start as u32,
+            ambient: node.ambient as u16,
+            tangent: node.tangent as u16,
+            active: active as u16,
+            gradient: Offset::NONE,
+        });
+    }
+    places
+}
+
+fn parents(graph: &Graph, derived: u32) -> &[u32] {
+    let derived = &graph.derived[derived as usize];
+    graph.functions[derived.pool as usize].nodes(derived.place as usize)
+}
+
+/// The chunk of every factor and of every derived node that a factor needs, and how many chunks there are.
+fn chunks(graph: &Graph) -> (Vec<usize>, Vec<Option<usize>>, usize) {
+    // Derived nodes that a factor or another derived node joins are in one group, named by its smallest member.
+    let mut group: Vec<usize> = (0..graph.derived.len()).collect();
+    let derived_of = |node: u32| match graph.nodes[node as usize].role {
+        Role::Derived(derived) => Some(derived as usize),
+        _ => None,
+    };
+    for (derived, entry) in graph.derived.iter().enumerate() {
+        for &parent in graph.functions[entry.pool as usize].nodes(entry.place as usize) {
+            if let Some(parent) = derived_of(parent) {
+                join(&mut group, derived, parent);
+            }
+        }
+    }
+    let touched = |factor: usize| {
+        let key = graph.order[factor];
+        graph.factors[key.pool as usize].nodes(key.place as usize).iter().filter_map(move |&node| derived_of(node))
+    };
+    for factor in 0..graph.order.len() {
+        let mut derived = touched(factor);
+        if let Some(first) = derived.next() {
+            derived.for_each(|other| join(&mut group, first, other));
+        }
+    }
+    let mut chunk_of_group: Vec<Option<usize>> = vec![None; graph.derived.len()];
+    let (mut chunk, mut filled) = (0, 0);
+    let mut chunk_of_factor = Vec::with_capacity(graph.order.len());
+    for factor in 0..graph.order.len() {
+        let root = touched(factor).next().map(|derived| root(&mut group, derived));
+        let own = match root.and_then(|root| chunk_of_group[root]) {
+            Some(chunk) => chunk,
+            None => {
+                if filled >= CHUNK {
+                    chunk += 1;
+                    filled = 0;
+                }
+                if let Some(root) = root {
+                    chunk_of_group[root] = Some(chunk);
+                }
+                chunk
+            }
+        };
+        filled += usize::from(own == chunk);
+        chunk_of_factor.push(own);
+    }
+    let chunk_of_derived = (0..graph.derived.len()).map(|derived| chunk_of_group[root(&mut group, derived)]).collect();
+    (chunk_of_factor, chunk_of_derived, chunk + 1)
+}
+
+fn root(group: &mut [usize], mut member: usize) -> usize {
+    while group[member] != member {
+        group[member] = group[group[member]];
+        member = group[member];
+    }
+    member
+}
+
+fn join(group: &mut [usize], a: usize, b: usize) {
+    let (a, b) = (root(group, a), root(group, b));
+    group[a.max(b)] = a.min(b);
+}
+
+/// Which chunks touch a node.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Owner {
+    Nobody,
+    Chunk(usize),
+    Shared,
+}
+
+fn owners(graph: &Graph, places: &[Place], factors: &[usize], derived: &[Option<usize>]) -> Vec<Owner> {
+    let mut owner = vec![Owner::Nobody; graph.nodes.len()];
+    let mut touch = |node: u32, chunk: usize| {
+        let owner = &mut owner[node as usize];
+        *owner = match *owner {
+            Owner::Nobody => Owner::Chunk(chunk),
+            Owner::Chunk(other) if other == chunk => Owner::Chunk(chunk),
+            _ => Owner::Shared,
+        };
+    };
+    for (key, &chunk) in graph.order.iter().zip(factors) {
+        for &node in graph.factors[key.pool as usize].nodes(key.place as usize) {
+            touch(node, chunk);
+        }
+    }
+    for (entry, &chunk) in graph.derived.iter().zip(derived) {
+        let Some(chunk) = chunk else { continue };
+        touch(entry.node, chunk);
+        if places[entry.node as usize].active > 0 {
+            for &parent in graph.functions[entry.pool as usize].nodes(entry.place as usize) {
+                touch(parent, chunk);
+            }
+        }
+    }
+    owner
+}
+
+struct Builder<'a> {
+    places: &'a mut Vec<Place>,
+    owner: Vec<Owner>,
+    shared: BTreeMap<(u32, u32), Offset>,
+    shared_len: usize,
+    /// Private blocks of all chunks so far.
+    blocks: Vec<Block>,
+}
+
+/// Blocks of one chunk, and who is next to whom in them.
+#[derive(Default)]
+struct Pattern {
+    offsets: BTreeMap<(u32, u32), Offset>,
+    neighbours: BTreeMap<u32, BTreeSet<u32>>,
+    len: usize,
+}
+
+impl Builder<'_> {
+    fn chunk(&mut self, graph: &Graph, index: usize, factors: &[usize], derived: &[usize]) -> Chunk {
+        let mut chunk = Chunk::default();
+        let mut pattern = Pattern::default();
+        for &derived in derived {
+            let node = graph.derived[derived].node as usize;
+            self.places[node].start = chunk.derived as u32;
+            chunk.derived += graph.nodes[node].ambient;
+        }
+        let mut chunk_nodes = BTreeSet::new();
+        let mut touch = |node: u32| {
+            chunk_nodes.insert(node);
+        };
+        for &factor in factors {
+            let key = graph.order[factor];
+            graph.factors[key.pool as usize].nodes(key.place as usize).iter().for_each(|&node| touch(node));
+        }
+        for &derived in derived {
+            touch(graph.derived[derived].node);
+            self::parents(graph, derived as u32).iter().for_each(|&node| touch(node));
+        }
+        for node in chunk_nodes {
+            let place = &mut self.places[node as usize];
+            if self.owner[node as usize] == Owner::Chunk(index) && place.active > 0 {
+                place.gradient = Offset::private(pattern.len);
+                pattern.len += usize::from(place.active);
+            }
+        }
+        for &factor in factors {
+            let key = graph.order[factor];
+            let (pool, place) = (key.pool, key.place as usize);
+            match chunk.runs.last_mut() {
+                Some((last, range)) if *last == pool && range.end == place => range.end += 1,
+                _ => chunk.runs.push((pool, place..place + 1)),
+            }
+            let nodes = graph.factors[pool as usize].nodes(place);
+            self.pairs(&mut pattern, nodes, &mut chunk.offsets);
+        }
+        let mut plans: Vec<FunctionPlan> =
+            derived.iter().rev().map(|&derived| self.function(graph, derived, &mut pattern)).collect();
+        plans.reverse();
+        chunk.functions = plans;
+        chunk.private = pattern.len;
+        let private = pattern.offsets.into_iter().filter(|(_, offset)| !offset.is_shared());
+        self.blocks.extend(private.map(|((row, column), offset)| Block { row, column, chunk: index as u32, offset }));
+        chunk
+    }
+
+    fn function(&mut self, graph: &Graph, derived: usize, pattern: &mut Pattern) -> FunctionPlan {
+        let entry = &graph.derived[derived];
+        let (node, nodes) = (entry.node, parents(graph, derived as u32));
+        let mut plan = FunctionPlan {
+            pool: entry.pool,
+            place: entry.place,
+            node,
+            jacobian: pattern.len,
+            diagonal: Offset::NONE,
+            parents: Vec::new(),
+            neighbours: Vec::new(),
+        };
+        if self.places[node as usize].active == 0 {
+            return plan;
+        }
+        let active: usize = nodes.iter().map(|&parent| usize::from(self.places[parent as usize].active)).sum();
+        pattern.len += usize::from(self.places[node as usize].active) * active;
+        plan.diagonal = self.offset(pattern, node, node);
+        let neighbours: Vec<u32> =
+            pattern.neighbours.get(&node).into_iter().flatten().copied().filter(|&other| other != node).collect();
+        self.pairs(pattern, nodes, &mut plan.parents);
+        for other in neighbours {
+            let own = self.offset(pattern, node, other);
+            let with_parents = nodes.iter().map(|&parent| self.offset(pattern, parent, other)).collect();
+            plan.neighbours.push((other, own, with_parents));
+        }
+        plan
+    }
+
+    fn pairs(&mut self, pattern: &mut Pattern, nodes: &[u32], offsets: &mut Vec<Offset>) {
+        for (a, &first) in nodes.iter().enumerate() {
+            for &second in &nodes[a..] {
+                offsets.push(self.offset(pattern, first, second));
+            }
+        }
+    }
+
+    /// The block of two nodes, laid out now if it is new.
+    fn offset(&mut self, pattern: &mut Pattern, a: u32, b: u32) -> Offset {
+        let size = usize::from(self.places[a as usize].active) * usize::from(self.places[b as usize].active);
+        if size == 0 {
+            return Offset::NONE;
+        }
+        let key = (a.min(b), a.max(b));
+        if let Some(&offset) = pattern.offsets.get(&key) {
+            return offset;
+        }
+        let is_shared = |node: u32| self.owner[node as usize] == Owner::Shared;
+        let offset = if is_shared(a) && is_shared(b) {
+            *self.shared.entry(key).or_insert_with(|| {
+                self.shared_len += size;
+                Offset::shared(self.shared_len - size)
+            })
+        } else {
+            pattern.len += size;
+            Offset::private(pattern.len - size)
+        };
+        pattern.offsets.insert(key, offset);
+        pattern.neighbours.entry(a).or_default().insert(b);
+        pattern.neighbours.entry(b).or_default().insert(a);
+        offset
+    }
+}

@@ -1,0 +1,249 @@
+//! Factors and functions of one type side by side, behind one call per run of them.
+use crate::accumulate::{Run, accumulate};
+use crate::jacobian::{Jacobian, compact, forward};
+use crate::scalar::Dual;
+use crate::{Factor, Function, Loss, Noise, Variable, Variables};
+use std::any::{Any, TypeId};
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// Factors take at most this many variables (see [`Variables`]).
+pub(crate) const MOST: usize = 8;
+
+/// All factors of one type.
+pub(crate) trait FactorPool: Any + Send + Sync {
+    fn nodes(&self, place: usize) -> &[u32];
+    fn squared_norm(&self, place: usize, x: &[&[f64]]) -> f64;
+    /// True for Gaussian priors, which are not data.
+    fn is_prior(&self) -> bool;
+    /// Adds the cost of a range of factors and, if wanted, their normal equations.
+    fn run(&self, range: Range<usize>, run: &mut Run<'_>);
+    fn as_any_mut(&mut self) -> &mut dyn Any;
+}
+
+/// All functions of one type.
+pub(crate) trait FunctionPool: Any + Send + Sync {
+    fn nodes(&self, place: usize) -> &[u32];
+    fn evaluate(&self, place: usize, x: &[&[f64]], y: &mut [f64], jacobian: Option<&mut Jacobian<'_>>);
+    fn as_any_mut(&mut self) -> &mut dyn Any;
+}
+
+struct Placed<F: Factor<M>, const M: usize> {
+    factor: F,
+    nodes: <F::On as Variables>::Nodes,
+    noise: Noise<M>,
+    loss: Loss,
+}
+
+pub(crate) struct Pool<F: Factor<M>, const M: usize> {
+    placed: Vec<Placed<F, M>>,
+}
+
+impl<F: Factor<M>, const M: usize> Default for Pool<F, M> {
+    fn default() -> Self {
+        Pool { placed: Vec::new() }
+    }
+}
+
+impl<F: Factor<M>, const M: usize> Pool<F, M> {
+    pub fn push(&mut self, factor: F, nodes: <F::On as Variables>::Nodes) -> (u32, (&mut Noise<M>, &mut Loss)) {
+        let place = self.placed.len();
+        self.placed.push(Placed { factor, nodes, noise: Noise::Isotropic(1.0), loss: Loss::Squared });
+        let placed = &mut self.placed[place];
+        (place as u32, (&mut placed.noise, &mut placed.loss))
+    }
+}
+
+impl<F: Factor<M>, const M: usize> FactorPool for Pool<F, M> {
+    fn nodes(&self, place: usize) -> &[u32] {
+        self.placed[place].nodes.as_ref()
+    }
+
+    fn squared_norm(&self, place: usize, x: &[&[f64]]) -> f64 {
+        let placed = &self.placed[place];
+        let mut r = placed.factor.evaluate(x, None);
+        placed.noise.whiten(&mut r, None);
+        r.iter().map(|x| x * x).sum()
+    }
+
+    fn is_prior(&self) -> bool {
+        false
+    }
+
+    fn run(&self, range: Range<usize>, run: &mut Run<'_>) {
+        let mut jacobian = std::mem::take(&mut run.scratch.jacobian);
+        for placed in &self.placed[range] {
+            let nodes = placed.nodes.as_ref();
+            let arguments = run.arguments(nodes);
+            let (x, columns) = (&arguments.x[..nodes.len()], &arguments.columns[..nodes.len()]);
+            if !run.derivatives || arguments.active == 0 {
+                let mut r = placed.factor.evaluate(x, None);
+                placed.noise.whiten(&mut r, None);
+                run.cost += 0.5 * placed.loss.evaluate(squared(&r), run.graduation).0;
+                run.skip(nodes.len());
+                continue;
+            }
+            let data = grown(&mut jacobian, M * arguments.width);
+            let mut r =
+                placed.factor.evaluate(x, Some(&mut Jacobian { data: &mut *data, columns, width: arguments.width }));
+            let mut starts = [0; MOST];
+            let width = compact(data, M, arguments.width, columns, &mut starts);
+            placed.noise.whiten(&mut r, Some((&mut *data, width)));
+            let (rho, slope) = placed.loss.evaluate(squared(&r), run.graduation);
+            run.cost += 0.5 * rho;
+            if slope != 1.0 {
+                let root = slope.sqrt();
+                r.iter_mut().for_each(|x| *x *= root);
+                data[..M * width].iter_mut().for_each(|x| *x *= root);
+            }
+            accumulate(run, nodes, &starts, &r, &data[..M * width]);
+        }
+        run.scratch.jacobian = jacobian;
+    }
+
+    fn as_any_mut(&mut self) -> &mut dyn Any {
+        self
+    }
+}
+
+/// The first `len` numbers of a buffer that only ever grows.
+#[inline]
+pub(crate) fn grown(buffer: &mut Vec<f64>, len: usize) -> &mut [f64] {
+    if buffer.len() < len {
+        buffer.resize(len, 0.0);
+    }
+    &mut buffer[..len]
+}
+
+#[inline]
+fn squared(r: &[f64]) -> f64 {
+    r.iter().map(|x| x * x).sum()
+}
+
+/// Gaussian priors on one type of variable: r = (x ⊟ mean) / σ, coordinate by coordinate.
+pub(crate) struct PriorPool<V> {
+    placed: Vec<PlacedPrior>,
+    variable: std::marker::PhantomData<fn() -> V>,
+}
+
+struct PlacedPrior {
+    node: [u32; 1],
+    mean: Vec<f64>,
+    /// 1/σ per coordinate, 0 where σ is infinite.
+    weights: Vec<f64>,
+}
+
+impl<V> Default for PriorPool<V> {
+    fn default() -> Self {
+        PriorPool { placed: Vec::new(), variable: std::marker::PhantomData }
+    }
+}
+
+impl<V: Variable<Over<f64> = V>> PriorPool<V> {
+    pub fn push(&mut self, node: u32, mean: &V, sigmas: &[f64]) -> u32 {
+        let mut stored = vec![0.0; mean.ambient()];
+        V::store(mean, &mut stored);
+        let mut weights: Vec<f64> = sigmas.iter().map(|sigma| 1.0 / sigma).collect();
+        weights.resize(mean.tangent(), 0.0);
+        self.placed.push(PlacedPrior { node: [node], mean: stored, weights });
+        self.placed.len() as u32 - 1
+    }
+
+    fn residual(&self, prior: &PlacedPrior, x: &[f64], r: &mut [f64]) {
+        V::local::<f64>(&prior.mean, &V::load(x), r);
+        for (r, w) in r.iter_mut().zip(&prior.weights) {
+            *r *= w;
+        }
+    }
+}
+
+impl<V: Variable<Over<f64> = V>> FactorPool for PriorPool<V> {
+    fn nodes(&self, place: usize) -> &[u32] {
+        &self.placed[place].node
+    }
+
+    fn squared_norm(&self, place: usize, x: &[&[f64]]) -> f64 {
+        let prior = &self.placed[place];
+        let mut r = vec![0.0; prior.weights.len()];
+        self.residual(prior, x[0], &mut r);
+        squared(&r)
+    }
+
+    fn is_prior(&self) -> bool {
+        true
+    }
+
+    fn run(&self, range: Range<usize>, run: &mut Run<'_>) {
+        let mut jacobian = std::mem::take(&mut run.scratch.jacobian);
+        let mut residual = std::mem::take(&mut run.scratch.residual);
+        let mut steps = std::mem::take(&mut run.scratch.steps);
+        for prior in &self.placed[range] {
+            let arguments = run.arguments(&prior.node);
+            let rows = prior.weights.len();
+            let r = grown(&mut residual, rows);
+            self.residual(prior, arguments.x[0], r);
+            run.cost += 0.5 * squared(r);
+            if !run.derivatives || arguments.active == 0 {
+                run.skip(1);
+                continue;
+            }
+            let columns = &arguments.columns[..1];
+            let data = grown(&mut jacobian, rows * arguments.width);
+            steps.resize(rows, Dual::from(0.0));
+            forward::<(V,)>(
+                &arguments.x[..1],
+                &mut Jacobian { data: &mut *data, columns, width: arguments.width },
+                &mut steps,
+                |(y,), steps| V::local(&prior.mean, &y, steps),
+            );
+            let mut starts = [0; MOST];
+            let width = compact(data, rows, arguments.width, columns, &mut starts);
+            for (row, w) in prior.weights.iter().enumerate() {
+                data[row * width..(row + 1) * width].iter_mut().for_each(|x| *x *= w);
+            }
+            accumulate(run, &prior.node, &starts, r, &data[..rows * width]);
+        }
+        run.scratch.jacobian = jacobian;
+        run.scratch.residual = residual;
+        run.scratch.steps = steps;
+    }
+
+    fn as_any_mut(&mut self) -> &mut dyn Any {
+        self
+    }
+}
+
+struct PlacedFunctions<F: Function> {
+    placed: Vec<(F, <F::On as Variables>::Nodes)>,
+}
+
+impl<F: Function> FunctionPool for PlacedFunctions<F> {
+    fn nodes(&self, place: usize) -> &[u32] {
+        self.placed[place].1.as_ref()
+    }
+
+    fn evaluate(&self, place: usize, x: &[&[f64]], y: &mut [f64], jacobian: Option<&mut Jacobian<'_>>) {
+        self.placed[place].0.evaluate(x, y, jacobian);
+    }
+
+    fn as_any_mut(&mut self) -> &mut dyn Any {
+        self
+    }
+}
+
+/// Puts a function beside the others of its type; returns (place, pool).
+pub(crate) fn push_function<F: Function>(
+    pools: &mut Vec<Box<dyn FunctionPool>>,
+    index: &mut BTreeMap<TypeId, usize>,
+    function: F,
+    nodes: <F::On as Variables>::Nodes,
+) -> (u32, u32) {
+    let next = pools.len();
+    let pool = *index.entry(TypeId::of::<F>()).or_insert(next);
+    if pool == next {
+        pools.push(Box::new(PlacedFunctions::<F> { placed: Vec::new() }));
+    }
+    let typed = pools[pool].as_any_mut().downcast_mut::<PlacedFunctions<F>>().expect("a pool is found by its type");
+    typed.placed.push((function, nodes));
+    (typed.placed.len() as u32 - 1, pool as u32)
+}

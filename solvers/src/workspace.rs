@@ -1,0 +1,369 @@
+//! Evaluates a graph: costs, and normal equations with the derived nodes substituted.
+use crate::accumulate::{Offset, Run, Scratch, add_scaled, arguments};
+use crate::graph::Graph;
+use crate::jacobian::{Jacobian, compact};
+use crate::layout::{Block, Chunk, FunctionPlan, Layout};
+use crate::pool::{MOST, grown};
+use rayon::prelude::*;
+
+/// Chunks that are worked on side by side, each with a copy of the shared arena of its own. Fixed, so that the order of
+/// summation does not depend on the number of threads.
+const WAVE: usize = 8;
+
+/// Steps of partly held nodes up to this length are spread out on the stack.
+const LONGEST: usize = 64;
+
+/// What a minimiser needs beside the graph, laid out once and reused as long as the graph's structure stays.
+pub struct Workspace {
+    pub(crate) layout: Layout,
+    revision: u64,
+    shared: Vec<f64>,
+    /// Where the nodes were at the last linearisation.
+    chunks: Vec<ChunkData>,
+    wave: Vec<Vec<f64>>,
+}
+
+#[derive(Default)]
+struct ChunkData {
+    private: Vec<f64>,
+    derived: Vec<f64>,
+    scratch: Scratch,
+    cost: f64,
+}
+
+/// Which factors a pass takes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Take {
+    All,
+    /// All but the priors.
+    Data,
+}
+
+impl Workspace {
+    /// Lays out the normal equations of a graph.
+    pub fn new(graph: &Graph) -> Self {
+        let layout = Layout::new(graph);
+        let chunks = layout
+            .chunks
+            .iter()
+            .map(|chunk| ChunkData {
+                private: vec![0.0; chunk.private],
+                derived: vec![0.0; chunk.derived],
+                ..ChunkData::default()
+            })
+            .collect();
+        let copies = if layout.chunks.len() > 1 { WAVE.min(layout.chunks.len()) } else { 0 };
+        Workspace {
+            shared: vec![0.0; layout.shared],
+            wave: vec![vec![0.0; layout.shared]; copies],
+            chunks,
+            layout,
+            revision: graph.revision,
+        }
+    }
+
+    /// True as long as the graph's structure and what is free in it have not changed.
+    pub fn fits(&self, graph: &Graph) -> bool {
+        self.revision == graph.revision
+    }
+
+    /// Sum of ρ/2 over all factors.
+    pub(crate) fn cost(&mut self, graph: &Graph, values: &[f64]) -> f64 {
+        self.pass(graph, values, false, Take::All)
+    }
+
+    /// The cost; H and b are in [`Workspace::block`] and [`Workspace::gradient`] then.
+    pub(crate) fn linearize(&mut self, graph: &Graph, values: &[f64], take: Take) -> f64 {
+        self.pass(graph, values, true, take)
+    }
+
+    fn pass(&mut self, graph: &Graph, values: &[f64], derivatives: bool, take: Take) -> f64 {
+        let layout = &self.layout;
+        let pass = Pass { graph, layout, values, derivatives, take };
+        self.shared.fill(0.0);
+        if let [data] = &mut self.chunks[..] {
+            pass.run(&layout.chunks[0], data, &mut self.shared);
+            return data.cost;
+        }
+        for (chunks, data) in layout.chunks.chunks(WAVE).zip(self.chunks.chunks_mut(WAVE)) {
+            let copies = &mut self.wave[..chunks.len()];
+            chunks.par_iter().zip(data).zip(&mut *copies).with_max_len(1).for_each(|((chunk, data), shared)| {
+                shared.fill(0.0);
+                pass.run(chunk, data, shared);
+            });
+            for copy in copies {
+                add_scaled(&mut self.shared, 1.0, copy);
+            }
+        }
+        self.chunks.iter().map(|data| data.cost).sum()
+    }
+
+    /// A block of H between free nodes.
+    pub(crate) fn block(&self, block: &Block) -> &[f64] {
+        let active = |node: u32| usize::from(self.layout.places[node as usize].active);
+        self.arena(block.chunk, block.offset, active(block.row) * active(block.column))
+    }
+
+    fn arena(&self, chunk: u32, offset: Offset, len: usize) -> &[f64] {
+        let arena = if offset.is_shared() { &self.shared } else { &self.chunks[chunk as usize].private };
+        &arena[offset.at()..offset.at() + len]
+    }
+
+    /// Moves every free node by its part of the step; the others keep their places in `moved`. Returns the largest change of
+    /// a stored number, relative to its size (absolute below 1).
+    pub(crate) fn retract(&self, graph: &Graph, step: &[f64], moved: &mut [f64]) -> f64 {
+        let mut largest: f64 = 0.0;
+        let mut full = [0.0; LONGEST];
+        let mut long = Vec::new();
+        for &(node, column) in &self.layout.free {
+            let node = &graph.nodes[node as usize];
+            let delta = match &node.free {
+                None => &step[column..column + node.tangent],
+                Some(free) => {
+                    let full = if node.tangent <= LONGEST {
+                        &mut full[..node.tangent]
+                    } else {
+                        long.resize(node.tangent, 0.0);
+                        &mut long[..]
+                    };
+                    full.fill(0.0);
+                    for (&coordinate, s) in free.iter().zip(&step[column..]) {
+                        full[usize::from(coordinate)] = *s;
+                    }
+                    &*full
+                }
+            };
+            let (x, y) = (&graph.values[node.start..], &mut moved[node.start..node.start + node.ambient]);
+            (node.retract)(&x[..node.ambient], delta, y);
+            for (x, y) in x.iter().zip(y) {
+                largest = largest.max((*y - x).abs() / x.abs().max(1.0));
+            }
+        }
+        largest
+    }
+
+    /// Copies the diagonal of H, over the columns of the system.
+    pub(crate) fn diagonal(&self, diagonal: &mut [f64]) {
+        for block in &self.layout.blocks {
+            if block.row == block.column {
+                let n = usize::from(self.layout.places[block.row as usize].active);
+                let data = self.block(block);
+                let column = self.layout.column(block.row);
+                for i in 0..n {
+                    diagonal[column + i] = data[i * (n + 1)];
+                }
+            }
+        }
+    }
+
+    /// Copies b, over the columns of the system.
+    pub(crate) fn gradient(&self, b: &mut [f64]) {
+        let layout = &self.layout;
+        for (&(node, column), &chunk) in layout.free.iter().zip(&layout.gradient_chunks) {
+            let place = &layout.places[node as usize];
+            let len = usize::from(place.active);
+            b[column..column + len].copy_from_slice(self.arena(chunk, place.gradient, len));
+        }
+    }
+}
+
+/// One pass over all chunks.
+#[derive(Clone, Copy)]
+struct Pass<'a> {
+    graph: &'a Graph,
+    layout: &'a Layout,
+    values: &'a [f64],
+    derivatives: bool,
+    take: Take,
+}
+
+impl Pass<'_> {
+    fn run(&self, chunk: &Chunk, data: &mut ChunkData, shared: &mut [f64]) {
+        if self.derivatives {
+            data.private.fill(0.0);
+        }
+        for plan in &chunk.functions {
+            self.derive(plan, data);
+        }
+        let mut run = Run {
+            nodes: &self.graph.nodes,
+            places: &self.layout.places,
+            values: self.values,
+            derived: &data.derived,
+            private: &mut data.private,
+            shared,
+            offsets: &chunk.offsets,
+            derivatives: self.derivatives,
+            graduation: self.graph.graduation,
+            cost: 0.0,
+            scratch: &mut data.scratch,
+        };
+        for (pool, range) in &chunk.runs {
+            let pool = &self.graph.factors[*pool as usize];
+            if self.take == Take::Data && pool.is_prior() {
+                range.clone().for_each(|_| run.skip(1));
+            } else {
+                pool.run(range.clone(), &mut run);
+            }
+        }
+        if self.derivatives {
+            for plan in chunk.functions.iter().rev() {
+                self.substitute(plan, &mut run);
+            }
+        }
+        data.cost = run.cost;
+    }
+
+    /// Evaluates a derived node and, if wanted, its Jacobian.
+    fn derive(&self, plan: &FunctionPlan, data: &mut ChunkData) {
+        let (nodes, places) = (&self.graph.nodes, &self.layout.places);
+        let place = &places[plan.node as usize];
+        let pool = &self.graph.functions[plan.pool as usize];
+        let parents = pool.nodes(plan.place as usize);
+        let (before, after) = data.derived.split_at_mut(place.start as usize);
+        let y = &mut after[..usize::from(place.ambient)];
+        let arguments = arguments(parents, nodes, places, self.values, before);
+        let (x, columns) = (&arguments.x[..parents.len()], &arguments.columns[..parents.len()]);
+        if !self.derivatives || place.active == 0 {
+            pool.evaluate(plan.place as usize, x, y, None);
+            return;
+        }
+        let rows = usize::from(place.active);
+        let g = grown(&mut data.scratch.jacobian, rows * arguments.width);
+        let jacobian = &mut Jacobian { data: &mut *g, columns, width: arguments.width };
+        pool.evaluate(plan.place as usize, x, y, Some(jacobian));
+        let len = rows * compact(g, rows, arguments.width, columns, &mut [0; MOST]);
+        data.private[plan.jacobian..plan.jacobian + len].copy_from_slice(&g[..len]);
+    }
+
+    /// Moves all that H and b say of a derived node d = f(P) to its parents P, with G = ∂d/∂P:
+    ///
+    ///   b_P += Gᵀ b_d      H_PP += Gᵀ H_dd G      H_Px += Gᵀ H_dx for every other node x
+    ///
+    /// and, where x is itself a parent, H_xx += Gᵀ H_dx + H_xd G.
+    fn substitute(&self, plan: &FunctionPlan, run: &mut Run<'_>) {
+        let places = run.places;
+        let place = &places[plan.node as usize];
+        let rows = usize::from(place.active);
+        if rows == 0 {
+            return;
+        }
+        let parents = self.graph.functions[plan.pool as usize].nodes(plan.place as usize);
+        let dim = |node: u32| usize::from(places[node as usize].active);
+        let width: usize = parents.iter().map(|&parent| dim(parent)).sum();
+        let mut scratch = std::mem::take(&mut run.scratch.product);
+        let needed = 2 * rows * width + rows * rows + rows;
+        let (g, rest) = grown(&mut scratch, needed).split_at_mut(rows * width);
+        let (product, rest) = rest.split_at_mut(rows * width);
+        let (h, b) = rest.split_at_mut(rows * rows);
+        g.copy_from_slice(&run.private[plan.jacobian..plan.jacobian + rows * width]);
+        h.copy_from_slice(run.block(plan.diagonal, rows * rows));
+        b.copy_from_slice(run.block(place.gradient, rows));
+
+        // product = H_dd G, by rows.
+        product.fill(0.0);
+        for (i, row) in product.chunks_exact_mut(width).enumerate() {
+            for (k, g) in g.chunks_exact(width).enumerate() {
+                add_scaled(row, h[i + k * rows], g);
+            }
+        }
+        let mut pair = 0;
+        let mut start_a = 0;
+        for (a, &first) in parents.iter().enumerate() {
+            let da = dim(first);
+            if da > 0 {
+                let gradient = run.block(places[first as usize].gradient, da);
+                for (g, &b) in g.chunks_exact(width).zip(&*b) {
+                    add_scaled(gradient, b, &g[start_a..start_a + da]);
+                }
+            }
+            let mut start_b = start_a;
+            for &second in &parents[a..] {
+                let (db, offset) = (dim(second), plan.parents[pair]);
+                pair += 1;
+                if offset != Offset::NONE {
+                    let block = run.block(offset, da * db);
+                    let (ga, pb) = ((&*g, start_a, da), (&*product, start_b, db));
+                    let (pa, gb) = ((&*product, start_a, da), (&*g, start_b, db));
+                    if first <= second {
+                        add_product_of(block, ga, width, pb, width, rows);
+                    } else {
+                        add_product_of(block, gb, width, pa, width, rows);
+                    }
+                    if first == second && start_a != start_b {
+                        add_product_of(block, gb, width, pa, width, rows);
+                    }
+                }
+                start_b += db;
+            }
+            start_a += da;
+        }
+        for (other, own, with_parents) in &plan.neighbours {
+            self.substitute_neighbour(plan, (*other, *own), with_parents, g, width, run);
+        }
+        run.scratch.product = scratch;
+    }
+
+    /// H_Px += Gᵀ H_dx for one node x.
+    fn substitute_neighbour(
+        &self,
+        plan: &FunctionPlan,
+        (other, own): (u32, Offset),
+        with_parents: &[Offset],
+        g: &[f64],
+        width: usize,
+        run: &mut Run<'_>,
+    ) {
+        let places = run.places;
+        let dim = |node: u32| usize::from(places[node as usize].active);
+        let (rows, columns) = (dim(plan.node), dim(other));
+        let parents = self.graph.functions[plan.pool as usize].nodes(plan.place as usize);
+        let mut s = std::mem::take(&mut run.scratch.residual);
+        // s = H_dx by rows, whichever of the two has the rows of the stored block.
+        let s_rows = grown(&mut s, rows * columns);
+        let block = run.block(own, rows * columns);
+        for i in 0..rows {
+            for j in 0..columns {
+                s_rows[i * columns + j] = if plan.node < other { block[i + j * rows] } else { block[j + i * columns] };
+            }
+        }
+        let mut start = 0;
+        for (&parent, &offset) in parents.iter().zip(with_parents) {
+            let d = dim(parent);
+            if offset != Offset::NONE {
+                let block = run.block(offset, d * columns);
+                let (gp, sx) = ((g, start, d), (&*s_rows, 0, columns));
+                if parent <= other {
+                    add_product_of(block, gp, width, sx, columns, rows);
+                }
+                if parent >= other {
+                    add_product_of(block, sx, columns, gp, width, rows);
+                }
+            }
+            start += d;
+        }
+        run.scratch.residual = s;
+    }
+}
+
+/// Columns `start..start + len` of a matrix stored by rows: (matrix, start, len).
+type Slice<'a> = (&'a [f64], usize, usize);
+
+/// block += Aᵀ B; the block is stored by columns, with A's columns as rows.
+#[inline]
+fn add_product_of(
+    block: &mut [f64],
+    (a, start_a, da): Slice<'_>,
+    width_a: usize,
+    (b, start_b, db): Slice<'_>,
+    width_b: usize,
+    rows: usize,
+) {
+    for i in 0..rows {
+        let a = &a[i * width_a + start_a..i * width_a + start_a + da];
+        let b = &b[i * width_b + start_b..i * width_b + start_b + db];
+        for (column, &s) in block.chunks_exact_mut(da).zip(b) {
+            add_scaled(column, s, a);
+        }
+    }
+}
