@@ -3,6 +3,7 @@
 pub mod camera;
 pub mod chain;
 mod error;
+pub mod factors;
 pub mod geometry;
 pub mod recording;
 pub mod rig;

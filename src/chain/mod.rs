@@ -106,7 +106,7 @@ impl Chain {
 
     /// Pose of link `i` in the one before.
     #[inline]
-    fn link(&self, i: usize, parameters: &[f64], joints: &[f64]) -> Pose {
+    pub(crate) fn link(&self, i: usize, parameters: &[f64], joints: &[f64]) -> Pose {
         let at = LINK_PARAMETERS * i;
         let row = std::array::from_fn(|k| parameters[at + k]);
         self.convention.link(self.kinds[i], &row, self.sign(i) * joints[i])

@@ -48,20 +48,16 @@ struct Coupling {
 }
 
 impl Schur {
-    /// Finds the size whose nodes are tied to no other node of that size and eliminate most columns; `None` where there
-    /// is none, or where too much would remain.
+    /// Finds small nodes of one size that no block ties to each other, as many columns as possible; `None` where there are
+    /// none, or where too much would remain.
     pub fn new(workspace: &Workspace) -> Option<Self> {
         let layout = &workspace.layout;
         let active = |node: u32| usize::from(layout.places[node as usize].active);
-        // Columns by size; a size with a block between two of its nodes is out.
+        let chosen = independent(workspace);
+        // Columns by size.
         let mut sizes: BTreeMap<usize, usize> = BTreeMap::new();
-        for &(node, _) in layout.free.iter().filter(|&&(node, _)| active(node) <= LARGEST) {
+        for &(node, _) in layout.free.iter().filter(|&&(node, _)| chosen[node as usize]) {
             *sizes.entry(active(node)).or_default() += active(node);
-        }
-        for block in layout.blocks.iter().filter(|block| block.row != block.column) {
-            if active(block.row) == active(block.column) {
-                sizes.remove(&active(block.row));
-            }
         }
         let (&size, &columns) = sizes.iter().max_by_key(|&(_, &columns)| columns)?;
         let n = layout.columns - columns;
@@ -71,7 +67,7 @@ impl Schur {
         let mut place = vec![(false, 0); layout.places.len()];
         let (mut eliminated, mut remaining, mut next) = (Vec::new(), Vec::new(), 0);
         for &(node, column) in &layout.free {
-            if active(node) == size {
+            if chosen[node as usize] && active(node) == size {
                 place[node as usize] = (true, eliminated.len());
                 eliminated.push(column);
             } else {
@@ -217,6 +213,24 @@ impl LinearSolver for Schur {
             y[column..column + len].copy_from_slice(&self.reduced_y[start..start + len]);
         }
     }
+}
+
+/// Small free nodes without a block between any two of them, by node: those with fewest neighbours come first.
+fn independent(workspace: &Workspace) -> Vec<bool> {
+    let layout = &workspace.layout;
+    let mut neighbours: Vec<Vec<u32>> = vec![Vec::new(); layout.places.len()];
+    for block in layout.blocks.iter().filter(|block| block.row != block.column) {
+        neighbours[block.row as usize].push(block.column);
+        neighbours[block.column as usize].push(block.row);
+    }
+    let small = |&node: &u32| usize::from(layout.places[node as usize].active) <= LARGEST;
+    let mut nodes: Vec<u32> = layout.free.iter().map(|&(node, _)| node).filter(small).collect();
+    nodes.sort_by_key(|&node| neighbours[node as usize].len());
+    let mut chosen = vec![false; layout.places.len()];
+    for node in nodes {
+        chosen[node as usize] = neighbours[node as usize].iter().all(|&other| !chosen[other as usize]);
+    }
+    chosen
 }
 
 /// Cholesky factor of a small matrix in its lower triangle, stored by columns.

@@ -1,0 +1,115 @@
+//! The reprojection error of one feature in one image (eqs. 2 and 6 of the paper).
+use crate::camera::{CameraModel, PARAMETERS};
+use handeye_solvers::scalar::{Dual, derivatives, seed};
+use handeye_solvers::{Factor, Jacobian, Pose, Scalar, Vector};
+use nalgebra::Vector3;
+
+/// fx, fy, cx, cy [px] and 8 distortion coefficients, of which a camera model uses the first few.
+pub type Intrinsics = Vector<PARAMETERS>;
+
+/// Predicted minus seen pixel [px] of a feature.
+///
+///   r = project(K, (Q C)⁻¹ P f) - pixel
+///
+/// on (P = world_from_link that carries the feature, f = the feature in that link [m], Q = world_from_link that carries
+/// the camera, C = link_from_camera, K = intrinsics). The world itself is a held identity in place of P or Q.
+#[derive(Clone, Copy, Debug)]
+pub struct Reprojection {
+    /// Where the feature was seen [px].
+    pub pixel: [f64; 2],
+    /// The camera's lens model.
+    pub model: CameraModel,
+}
+
+impl Factor<2> for Reprojection {
+    type On = (Pose, Vector<3>, Pose, Pose, Intrinsics);
+
+    fn residual<T: Scalar>(
+        &self,
+        (carrier, feature, mount, camera, intrinsics): (Pose<T>, Vector<3, T>, Pose<T>, Pose<T>, Vector<PARAMETERS, T>),
+    ) -> [T; 2] {
+        let in_world = carrier.transform(&feature);
+        let in_camera = camera.inverse_transform(&mount.inverse_transform(&in_world));
+        let [u, v] = self.model.project(&intrinsics.data.0[0], &in_camera);
+        [u - self.pixel[0], v - self.pixel[1]]
+    }
+
+    /// Dual numbers through the lens only; the rest is the chain rule of rigid motion.
+    #[inline]
+    fn evaluate(&self, x: &[&[f64]], jacobian: Option<&mut Jacobian<'_>>) -> [f64; 2] {
+        let [carrier, mount, camera] = [x[0], x[2], x[3]].map(Pose::from_stored);
+        let arm = carrier.rotation * Vector3::new(x[1][0], x[1][1], x[1][2]);
+        let from_mount = arm + carrier.translation - mount.translation;
+        let from_camera = mount.rotation.tr_mul(&from_mount) - camera.translation;
+        let in_camera = camera.rotation.tr_mul(&from_camera);
+        let [fx, fy, cx, cy] = [x[4][0], x[4][1], x[4][2], x[4][3]];
+        let distortion = &x[4][4..];
+        let pixel = |[a, b]: [f64; 2]| [fx * a + cx - self.pixel[0], fy * b + cy - self.pixel[1]];
+        let Some(jacobian) = jacobian else {
+            return pixel(self.model.lens(distortion, &in_camera));
+        };
+        let coefficients = self.model.distortion().len();
+        let bends = (0..coefficients).any(|k| jacobian.wanted_coordinate(4, 4 + k));
+        let (seen, by_point, by_distortion) = if bends {
+            lens::<11>(self.model, distortion, &in_camera)
+        } else if coefficients > 0 {
+            lens::<3>(self.model, distortion, &in_camera)
+        } else {
+            lens::<3>(self.model, &[], &in_camera)
+        };
+        for (row, focal) in [fx, fy].into_iter().enumerate() {
+            let [a, b, c] = by_point[row].map(|slope| focal * slope);
+            // The row with respect to a point: in the camera, in the frame that carries it, in the world.
+            let in_mount = camera.rotation * Vector3::new(a, b, c);
+            let in_world = mount.rotation * in_mount;
+            if jacobian.wanted(0) {
+                write(jacobian.row(row, 0), arm.cross(&in_world), in_world);
+            }
+            if jacobian.wanted(1) {
+                jacobian.row(row, 1).copy_from_slice(carrier.rotation.tr_mul(&in_world).as_slice());
+            }
+            if jacobian.wanted(2) {
+                write(jacobian.row(row, 2), in_world.cross(&from_mount), -in_world);
+            }
+            if jacobian.wanted(3) {
+                write(jacobian.row(row, 3), in_mount.cross(&from_camera), -in_mount);
+            }
+            if jacobian.wanted(4) {
+                let columns = jacobian.row(row, 4);
+                columns[..4].fill(0.0);
+                columns[row] = seen[row];
+                columns[2 + row] = 1.0;
+                for (column, slope) in columns[4..].iter_mut().zip(by_distortion[row]) {
+                    *column = focal * slope;
+                }
+            }
+        }
+        pixel(seen)
+    }
+}
+
+/// The lens and its derivatives by the point and, where `N` is 11, by the distortion coefficients.
+#[inline]
+fn lens<const N: usize>(
+    model: CameraModel,
+    distortion: &[f64],
+    in_camera: &Vector3<f64>,
+) -> ([f64; 2], [[f64; 3]; 2], [[f64; 8]; 2]) {
+    let point = Vector3::new(seed::<N>(in_camera.x, 0), seed::<N>(in_camera.y, 1), seed::<N>(in_camera.z, 2));
+    let mut coefficients = [Dual::<N>::from(0.0); 8];
+    for (k, (lifted, &value)) in coefficients.iter_mut().zip(distortion).enumerate() {
+        *lifted = if N == 11 { seed::<N>(value, 3 + k) } else { Dual::from(value) };
+    }
+    let lifted = model.lens(&coefficients, &point);
+    let slopes = lifted.map(|value| derivatives(&value));
+    (
+        lifted.map(|value| value.value()),
+        slopes.map(|slope| [slope[0], slope[1], slope[2]]),
+        slopes.map(|slope| std::array::from_fn(|k| if N == 11 { slope[(3 + k) % N] } else { 0.0 })),
+    )
+}
+
+#[inline]
+fn write(columns: &mut [f64], w: Vector3<f64>, v: Vector3<f64>) {
+    columns.copy_from_slice(&[w.x, w.y, w.z, v.x, v.y, v.z]);
+}
