@@ -37,3 +37,16 @@ pub enum JointKind {
     /// Slides along its axis.
     Prismatic,
 }
+
+impl JointKind {
+    /// Every kind of joint.
+    pub const ALL: &'static [JointKind] = &[JointKind::Revolute, JointKind::Prismatic];
+
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            JointKind::Revolute => "revolute",
+            JointKind::Prismatic => "prismatic",
+        }
+    }
+}
