@@ -3,9 +3,12 @@ mod names;
 mod paths;
 mod read;
 mod replace;
-mod rotations;
+pub(crate) mod rotations;
 mod types;
 mod write;
 
+pub(crate) use names::{problem_of_joint_name, problem_of_name};
 pub use paths::{CameraField, JointField, Parameter, matches};
+pub(crate) use read::problem_of_distortion;
+pub(crate) use replace::replace_file;
 pub use types::*;
