@@ -1,5 +1,8 @@
 //! Everything that can go wrong, with its place and what would do.
-use std::path::PathBuf;
+mod spelling;
+
+pub(crate) use spelling::suggestion;
+use std::path::{Path, PathBuf};
 
 /// Why a piece of work was not done. Messages are lower case, without a full stop, and name the place first.
 #[derive(Debug, thiserror::Error)]
@@ -39,5 +42,18 @@ impl Error {
     /// True where the input or the arguments are at fault (exit status 2), false where the work could not be done (1).
     pub fn is_input(&self) -> bool {
         matches!(self, Error::Io { .. } | Error::Malformed { .. } | Error::Unusable(_))
+    }
+
+    /// What the operating system said of a file.
+    pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
+        Error::Io { path: path.to_owned(), source }
+    }
+
+    /// A problem at a byte offset of a text, which becomes line and column.
+    pub(crate) fn at(file: &str, text: &str, offset: usize, problem: String) -> Self {
+        let before = &text[..text.floor_char_boundary(offset)];
+        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+        let line = 1 + before.matches('\n').count();
+        Error::Malformed { file: file.to_owned(), line, column: 1 + before[line_start..].chars().count(), problem }
     }
 }

@@ -65,6 +65,19 @@ pub enum JointKind {
     Prismatic,
 }
 
+impl JointKind {
+    /// Every kind of joint.
+    pub const ALL: &'static [JointKind] = &[JointKind::Revolute, JointKind::Prismatic];
+
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            JointKind::Revolute => "revolute",
+            JointKind::Prismatic => "prismatic",
+        }
+    }
+}
+
 /// What of a chain of joints is not estimated. Parameters are passed along: five per joint, as in [`LINK_PARAMETERS`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Chain {

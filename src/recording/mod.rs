@@ -1,4 +1,8 @@
 //! Recordings: what was commanded, read and seen; one file per format.
+mod join;
+mod jsonl;
+mod names;
 mod types;
 
+pub use jsonl::Reader;
 pub use types::*;

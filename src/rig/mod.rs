@@ -1,4 +1,14 @@
 //! Rigs: robot, cameras and features, what is known of them, what is free and what is held.
+mod names;
+mod paths;
+mod read;
+mod replace;
+pub(crate) mod rotations;
 mod types;
+mod write;
 
+pub(crate) use names::{problem_of_joint_name, problem_of_name};
+pub use paths::{CameraField, JointField, Parameter, matches};
+pub(crate) use read::problem_of_distortion;
+pub(crate) use replace::replace_file;
 pub use types::*;

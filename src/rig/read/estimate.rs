@@ -1,0 +1,107 @@
+//! The table `[estimate]`: what is held and what is roughly known, by parameter path.
+use super::document::{Field, Fields, Node};
+use crate::Error;
+use crate::error::suggestion;
+use crate::rig::paths::{CameraField, JointField, matches};
+use crate::rig::{Estimate, Parameter, Rig};
+use std::collections::BTreeMap;
+
+/// Paths are checked against the other parts of the rig, which are complete.
+pub(super) fn read_estimate(node: &Node, rig: &Rig) -> Result<Estimate, Error> {
+    let fields = node.clone().table(&["fixed", "prior"])?.labelled("estimate");
+    let fixed = match fields.field("fixed") {
+        Some(list) => list.value.list()?,
+        None => Vec::new(),
+    };
+    let prior = fields.optional("prior", |node| {
+        read_by_path(node, |field, path| {
+            if let Some(problem) = problem_of_pattern(path, rig) {
+                return Err(field.value.error(problem));
+            }
+            field.value.positive()
+        })
+    })?;
+    Ok(Estimate {
+        fixed: fixed.iter().map(|node| read_fixed(node, rig)).collect::<Result<_, Error>>()?,
+        prior: prior.unwrap_or_default(),
+    })
+}
+
+fn read_fixed(node: &Node, rig: &Rig) -> Result<String, Error> {
+    let pattern = node.text()?;
+    if let Some(problem) = problem_of_pattern(pattern, rig) {
+        return Err(node.error(problem));
+    }
+    let lacking = |parameter: &Parameter| {
+        // A base that is left out is the identity, and intrinsics may come from the recording.
+        !matches!(parameter, Parameter::Base | Parameter::CameraField { .. }) && !rig.has_value(parameter)
+    };
+    let mut parameters = rig.parameters().into_iter().filter(lacking).map(|parameter| parameter.path(rig));
+    match parameters.find(|path| matches(pattern, path)) {
+        Some(path) => {
+            Err(node.error(format!("`{pattern}` holds `{path}`, which has no value (give one, or do not hold it)")))
+        }
+        None => Ok(pattern.to_owned()),
+    }
+}
+
+/// A table by parameter path. Quoted paths are one key; paths without quotes are tables within tables.
+pub(super) fn read_by_path<'a, T>(
+    node: &Node<'a>,
+    read: impl Fn(&Field<'a>, &str) -> Result<T, Error>,
+) -> Result<BTreeMap<String, T>, Error> {
+    let mut values = BTreeMap::new();
+    let mut open: Vec<(String, Fields)> = vec![(String::new(), node.clone().any_table()?)];
+    while let Some((prefix, fields)) = open.pop() {
+        for field in fields.iter() {
+            let path = if prefix.is_empty() { field.key.to_owned() } else { format!("{prefix}.{}", field.key) };
+            if field.value.is_table() {
+                open.push((path, field.value.clone().any_table()?));
+                continue;
+            }
+            let value = read(&field, &path)?;
+            if values.insert(path.clone(), value).is_some() {
+                return Err(field.value.error(format!("`{path}` is given twice")));
+            }
+        }
+    }
+    Ok(values)
+}
+
+/// Why a pattern covers nothing. Where the rig has no joints, cameras or features of its own, the recording names them.
+pub(super) fn problem_of_pattern(pattern: &str, rig: &Rig) -> Option<String> {
+    let components: Vec<&str> = pattern.split('.').collect();
+    let joints: Vec<&str> = rig.robot.joints.iter().map(|joint| joint.name.as_str()).collect();
+    let cameras: Vec<&str> = rig.cameras.iter().map(|camera| camera.name.as_str()).collect();
+    let features: Vec<&str> = rig.features.iter().map(|feature| feature.name.as_str()).collect();
+    let joint_fields: Vec<&str> = JointField::ALL.iter().map(|field| field.name()).collect();
+    let camera_fields: Vec<&str> =
+        std::iter::once("pose").chain(CameraField::ALL.iter().map(|field| field.name())).collect();
+    // What may stand at each place of a path, for each kind of parameter; an empty list is any name.
+    let grammar: [&[&[&str]]; 4] = [
+        &[&["robot"], &["base"]],
+        &[&["robot"], &["joints"], &joints, &joint_fields],
+        &[&["cameras"], &cameras, &camera_fields],
+        &[&["features"], &features, &["xyz"]],
+    ];
+    let fits =
+        |found: &str, known: &[&str]| found == "*" || known.contains(&found) || (known.is_empty() && !found.is_empty());
+    // The first component at which no kind of parameter goes on, and what would do there.
+    for (place, found) in components.iter().enumerate() {
+        let begun = |kind: &&&[&[&str]]| components[..place].iter().zip(kind.iter()).all(|(c, known)| fits(c, known));
+        let going: Vec<&&[&[&str]]> = grammar.iter().filter(begun).collect();
+        let known: Vec<&[&str]> = going.iter().filter_map(|kind| kind.get(place).copied()).collect();
+        if known.is_empty() {
+            return Some(format!(
+                "`{pattern}` matches nothing: there is nothing below `{}`",
+                components[..place].join(".")
+            ));
+        }
+        if !known.iter().any(|known| fits(found, known)) {
+            let mut words: Vec<&str> = known.concat();
+            words.dedup();
+            return Some(format!("`{pattern}` matches nothing: unknown `{found}` {}", suggestion(found, words)));
+        }
+    }
+    None
+}

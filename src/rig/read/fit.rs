@@ -1,0 +1,40 @@
+//! The table `[fit]`: how a learned rig was learned.
+use super::document::Node;
+use super::estimate::{problem_of_pattern, read_by_path};
+use crate::Error;
+use crate::rig::{Fit, Rig};
+
+pub(super) fn read_fit(node: &Node, rig: &Rig) -> Result<Fit, Error> {
+    let known = ["samples", "observations", "rejected", "rms_px", "mean_px", "gauge", "sd"];
+    let fields = node.clone().table(&known)?.labelled("fit");
+    let count = |node: &Node| node.whole::<u32>().map(|n| n as usize);
+    let sd = fields.optional("sd", |node| {
+        read_by_path(node, |field, path| match problem_of_pattern(path, rig) {
+            Some(problem) => Err(field.value.error(problem)),
+            None => read_deviations(&field.value),
+        })
+    })?;
+    Ok(Fit {
+        samples: fields.optional("samples", count)?.unwrap_or_default(),
+        observations: fields.optional("observations", count)?.unwrap_or_default(),
+        rejected: fields.optional("rejected", count)?.unwrap_or_default(),
+        rms_px: fields.optional("rms_px", Node::not_negative)?.unwrap_or_default(),
+        mean_px: fields.optional("mean_px", Node::not_negative)?.unwrap_or_default(),
+        gauge: fields.optional("gauge", read_gauge)?.unwrap_or_default(),
+        sd: sd.unwrap_or_default(),
+    })
+}
+
+/// One sentence or several.
+fn read_gauge(node: &Node) -> Result<Vec<String>, Error> {
+    if node.is_list() {
+        node.list()?.iter().map(|entry| entry.text().map(str::to_owned)).collect()
+    } else {
+        Ok(vec![node.text()?.to_owned()])
+    }
+}
+
+/// One number, or one for every number of the parameter.
+fn read_deviations(node: &Node) -> Result<Vec<f64>, Error> {
+    if node.is_list() { node.list()?.iter().map(Node::not_negative).collect() } else { Ok(vec![node.not_negative()?]) }
+}

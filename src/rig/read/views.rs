@@ -1,0 +1,94 @@
+//! The tables `[[cameras]]` and `[[features]]`: what sees, and what is seen.
+use super::document::{Fields, Node};
+use super::named::read_named;
+use super::pose::read_pose;
+use crate::Error;
+use crate::camera::CameraModel;
+use crate::error::suggestion;
+use crate::rig::names::problem_of_name;
+use crate::rig::{Camera, Feature, Joint, Parent};
+
+const CAMERA_KEYS: &[&str] = &["name", "size", "model", "fx", "fy", "cx", "cy", "distortion", "parent", "pose"];
+const FEATURE_KEYS: &[&str] = &["name", "parent", "xyz"];
+
+pub(super) fn read_cameras(list: Option<Node>, joints: &[Joint]) -> Result<Vec<Camera>, Error> {
+    let named = read_named(list.as_ref(), "camera", CAMERA_KEYS, problem_of_name)?;
+    named.into_iter().map(|(name, fields)| read_camera(name, &fields, joints)).collect()
+}
+
+fn read_camera(name: String, fields: &Fields, joints: &[Joint]) -> Result<Camera, Error> {
+    let model = fields.optional("model", |node| node.word("model", CameraModel::ALL, CameraModel::name))?;
+    Ok(Camera {
+        name,
+        size: fields.optional("size", read_size)?,
+        model,
+        fx: fields.optional("fx", Node::positive)?,
+        fy: fields.optional("fy", Node::positive)?,
+        cx: fields.number("cx")?,
+        cy: fields.number("cy")?,
+        distortion: fields.optional("distortion", |node| read_distortion(node, model))?,
+        parent: fields.optional("parent", |node| read_parent(node, joints))?.unwrap_or(Parent::World),
+        pose: fields.optional("pose", read_pose)?,
+    })
+}
+
+pub(super) fn read_features(list: Option<Node>, joints: &[Joint]) -> Result<Vec<Feature>, Error> {
+    let read = |(name, fields): (String, Fields)| -> Result<Feature, Error> {
+        Ok(Feature {
+            name,
+            parent: fields.optional("parent", |node| read_parent(node, joints))?.unwrap_or(Parent::Tip),
+            xyz: fields.optional("xyz", Node::numbers::<3>)?,
+        })
+    };
+    read_named(list.as_ref(), "feature", FEATURE_KEYS, problem_of_name)?.into_iter().map(read).collect()
+}
+
+fn read_size(node: &Node) -> Result<[u32; 2], Error> {
+    let list = node.list()?;
+    let [width, height] = list.as_slice() else {
+        return Err(node.error(format!("expected width and height, found {} numbers", list.len())));
+    };
+    for side in [width, height] {
+        if side.whole::<i64>()? <= 0 {
+            return Err(node.error(format!("width and height must be above 0, found {}", side.whole::<i64>()?)));
+        }
+    }
+    Ok([width.whole()?, height.whole()?])
+}
+
+fn read_distortion(node: &Node, model: Option<CameraModel>) -> Result<Vec<f64>, Error> {
+    let numbers = node.any_numbers()?;
+    match problem_of_distortion(model, numbers.len()) {
+        Some(problem) => Err(node.error(problem)),
+        None => Ok(numbers),
+    }
+}
+
+/// Why there are too many coefficients. Where no model is named, the recording's header may name one.
+pub(crate) fn problem_of_distortion(model: Option<CameraModel>, found: usize) -> Option<String> {
+    let most = CameraModel::ALL.iter().map(|model| model.distortion().len()).max().unwrap_or(0);
+    match model {
+        None if found > most => Some(format!("found {found} coefficients, and no model has more than {most}")),
+        Some(model) if found > model.distortion().len() => Some(match model.distortion() {
+            [] => format!("found {found} coefficients, and the model `{}` has none", model.name()),
+            known => format!(
+                "found {found} coefficients, and the model `{}` has {} ({})",
+                model.name(),
+                known.len(),
+                known.join(" ")
+            ),
+        }),
+        _ => None,
+    }
+}
+
+fn read_parent(node: &Node, joints: &[Joint]) -> Result<Parent, Error> {
+    match node.text()? {
+        "world" => Ok(Parent::World),
+        "tip" => Ok(Parent::Tip),
+        name => joints.iter().position(|joint| joint.name == name).map(Parent::Link).ok_or_else(|| {
+            let known = ["world", "tip"].into_iter().chain(joints.iter().map(|joint| joint.name.as_str()));
+            node.error(format!("no joint is called `{name}` {}", suggestion(name, known)))
+        }),
+    }
+}
