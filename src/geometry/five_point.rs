@@ -1,9 +1,9 @@
 //! The essential matrices of five correspondences (Nistér 2004, An efficient solution to the five-point relative pose
 //! problem).
 //!
-//! E = x X + y Y + z Z + W over the four matrices that fulfil bᵀ E a = 0 for all five. det E = 0 and
-//! 2 E Eᵀ E - tr(E Eᵀ) E = 0 are ten cubics in x, y, z; eliminating the ten monomials of highest order in x and y leaves
-//! a 3 x 3 matrix over z whose determinant, of degree ten, vanishes at the solutions.
+//! E = x X + y Y + z Z + W over the four matrices that fulfil bᵀ E a = 0 for all five. det E = 0 and 2 E Eᵀ E - tr(E
+//! Eᵀ) E = 0 are ten cubics in x, y, z; eliminating the ten monomials of highest order in x and y leaves a 3 x 3
+//! matrix over z whose determinant, of degree ten, vanishes at the solutions.
 use super::polynomial::{multiply, real_roots};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
@@ -35,8 +35,8 @@ const POLISH: usize = 3;
 
 /// The essential matrices E with bᵢᵀ E aᵢ = 0, at most 10, of Frobenius norm √2 and rank 2.
 ///
-/// `a`, `b`: unit bearings of the same points in the frames of two cameras. E = [t] R for p_b = R p_a + t. Points may lie
-/// in a plane. Empty where the five do not determine a finite number of solutions.
+/// `a`, `b`: unit bearings of the same points in the frames of two cameras. E = [t] R for p_b = R p_a + t. Points may
+/// lie in a plane. Empty where the five do not determine a finite number of solutions.
 pub fn five_point(a: &[Vector3<f64>; 5], b: &[Vector3<f64>; 5]) -> Vec<Matrix3<f64>> {
     let Some(basis) = null_space(a, b) else { return Vec::new() };
     let Some(rows) = eliminate(constraints(&basis)) else { return Vec::new() };

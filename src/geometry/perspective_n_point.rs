@@ -1,8 +1,8 @@
 //! The pose of a camera from known points and the directions that they are seen in.
 //!
-//! As in SQPnP (Terzakis and Lourakis 2020) the translation is eliminated from the error in object space, which leaves a
-//! quadratic form rᵀ Ω r in the nine elements of the rotation. Its minima on SO(3) are found from starts that cover all
-//! rotations, at a cost that does not depend on the number of points, and then refined on the angles.
+//! As in SQPnP (Terzakis and Lourakis 2020) the translation is eliminated from the error in object space, which leaves
+//! a quadratic form rᵀ Ω r in the nine elements of the rotation. Its minima on SO(3) are found from starts that cover
+//! all rotations, at a cost that does not depend on the number of points, and then refined on the angles.
 use super::reprojection::refine;
 use super::rotation::nearest_rotation;
 use handeye_solvers::Pose;
@@ -27,9 +27,9 @@ const SAME: f64 = 1e-3;
 
 /// The poses `camera_from_points` that may have been, least error first: at most 4.
 ///
-/// `points`: at least 3, in any frame and unit. `bearings`: unit directions in the camera's frame, by index. The error is
-/// Σ |q / |q| - b|², q the point in the camera's frame. Every minimum of it that has all points in front of the camera is a
-/// candidate: points in a plane often have two, three points up to four. Empty for collinear points.
+/// `points`: at least 3, in any frame and unit. `bearings`: unit directions in the camera's frame, by index. The error
+/// is Σ |q / |q| - b|², q the point in the camera's frame. Every minimum of it that has all points in front of the
+/// camera is a candidate: points in a plane often have two, three points up to four. Empty for collinear points.
 pub fn resect(points: &[Vector3<f64>], bearings: &[Vector3<f64>]) -> Vec<Pose> {
     resect_with_errors(points, bearings).into_iter().map(|(pose, _)| pose).collect()
 }

@@ -1,8 +1,8 @@
 //! The pose of one camera in another from what both see, with wrong correspondences among it.
 //!
-//! Samples of five correspondences give hypotheses (Nistér's five-point method inside RANSAC), scored by truncated squared
-//! Sampson distances (MSAC, Torr and Zisserman 2000); a new best one is refined at once (LO-RANSAC, Chum et al. 2003). A
-//! correspondence whose point would lie behind a camera counts as wrong.
+//! Samples of five correspondences give hypotheses (Nistér's five-point method inside RANSAC), scored by truncated
+//! squared Sampson distances (MSAC, Torr and Zisserman 2000); a new best one is refined at once (LO-RANSAC, Chum et
+//! al. 2003). A correspondence whose point would lie behind a camera counts as wrong.
 use super::essential::{decompose, essential, in_front_of_both};
 use super::five_point::five_point;
 use super::ransac::{draw, enough, subset};
@@ -41,9 +41,9 @@ pub struct RelativePose {
 
 /// The pose `b_from_a` of which the unit bearings `a` and `b` of the same points (by index) tell most.
 ///
-/// `threshold`: largest Sampson distance of an inlier [rad], about 3 σ of a bearing. The same `seed` gives the same result.
-/// Points in a plane will do. `None` for fewer than 5 correspondences or inliers, and where they leave the pose open: a
-/// baseline too short for the threshold, collinear points.
+/// `threshold`: largest Sampson distance of an inlier [rad], about 3 σ of a bearing. The same `seed` gives the same
+/// result. Points in a plane will do. `None` for fewer than 5 correspondences or inliers, and where they leave the
+/// pose open: a baseline too short for the threshold, collinear points.
 pub fn relative_pose(a: &[Vector3<f64>], b: &[Vector3<f64>], threshold: f64, seed: u64) -> Option<RelativePose> {
     relative_pose_candidates(a, b, threshold, seed).into_iter().next()
 }
@@ -57,7 +57,7 @@ pub fn relative_pose_candidates(
     threshold: f64,
     seed: u64,
 ) -> Vec<RelativePose> {
-    if a.len() < 5 || a.len() != b.len() || !(threshold > 0.0) {
+    if a.len() < 5 || a.len() != b.len() || threshold.is_nan() || threshold <= 0.0 {
         return Vec::new();
     }
     let problem = Problem { a, b, threshold };

@@ -35,7 +35,7 @@ pub fn resect_robust(
     threshold: f64,
     seed: u64,
 ) -> Option<Resection> {
-    if points.len() < 4 || points.len() != bearings.len() || !(threshold > 0.0) {
+    if points.len() < 4 || points.len() != bearings.len() || threshold.is_nan() || threshold <= 0.0 {
         return None;
     }
     let problem = Problem { points, bearings, limit: threshold * threshold };

@@ -27,7 +27,8 @@ pub(super) fn squared_distance(e: &Matrix3<f64>, a: &Vector3<f64>, b: &Vector3<f
     squared / (ea.norm_squared() + etb.norm_squared() - 2.0 * squared).max(f64::MIN_POSITIVE)
 }
 
-/// The pose `b_from_a`, with a baseline of length 1, that minimises Σ r² over some of the correspondences, from a start.
+/// The pose `b_from_a`, with a baseline of length 1, that minimises Σ r² over some of the correspondences, from a
+/// start.
 ///
 /// Gauss-Newton with Marquardt's damping on rotation and direction of the baseline, 5 numbers. `None` where the
 /// correspondences leave the pose open.
@@ -153,8 +154,8 @@ mod tests {
         }
     }
 
-    // The Sampson distance is one coordinate of noise per correspondence: Σ r² / σ² is χ² with n - 5 degrees of freedom.
-    // Over 100 sets of 30: 2500, standard deviation 71; 3 σ.
+    // The Sampson distance is one coordinate of noise per correspondence: Σ r² / σ² is χ² with n - 5 degrees of
+    // freedom. Over 100 sets of 30: 2500, standard deviation 71; 3 σ.
     #[test]
     fn distances_of_noisy_bearings_follow_chi_square() {
         let (sigma, mut sum) = (1e-3, 0.0);
