@@ -1,9 +1,13 @@
 //! The essential matrices of five correspondences (Nistér 2004, An efficient solution to the five-point relative pose
 //! problem).
 //!
-//! E = x X + y Y + z Z + W over the four matrices that fulfil bᵀ E a = 0 for all five. det E = 0 and 2 E Eᵀ E - tr(E
-//! Eᵀ) E = 0 are ten cubics in x, y, z; eliminating the ten monomials of highest order in x and y leaves a 3 x 3
-//! matrix over z whose determinant, of degree ten, vanishes at the solutions.
+//! E = x X + y Y + z Z + W over the four matrices that fulfil bᵀ E a = 0 for all five. Ten cubics in x, y, z have to
+//! vanish,
+//!
+//!   det E = 0 and 2 E Eᵀ E - tr(E Eᵀ) E = 0,
+//!
+//! and eliminating the ten monomials of highest order in x and y from them leaves a 3 x 3 matrix over z whose
+//! determinant, of degree ten, is 0 at the solutions.
 use super::polynomial::{multiply, real_roots};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
