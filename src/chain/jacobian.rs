@@ -12,6 +12,9 @@ use nalgebra::Vector3;
 /// the world.
 type Column = [f64; 6];
 
+/// (w, v), both in the frame of the link before.
+type Motion = (Vector3<f64>, Vector3<f64>);
+
 /// Derivatives of a link's pose. Kept between calls, so that none but the first allocates.
 #[derive(Clone, Debug, Default)]
 pub struct ChainJacobian {
@@ -40,10 +43,10 @@ impl Chain {
     ) -> Pose {
         jacobian.clear(self.len());
         let mut pose = *world_from_base;
-        for i in 0..upto {
+        for (i, &joint) in joints.iter().enumerate().take(upto) {
             let at = LINK_PARAMETERS * i;
             let dual = std::array::from_fn(|k| seed::<LINK_PARAMETERS>(parameters[at + k], k));
-            let reading = Dual::from_re(self.sign(i) * joints[i]);
+            let reading = Dual::from_re(self.sign(i) * joint);
             let link = self.convention.link(self.kinds[i], &dual, reading);
             let (value, motions) = motions(&link);
             for (column, (w, v)) in jacobian.parameters[at..].iter_mut().zip(motions) {
@@ -85,7 +88,7 @@ impl ChainJacobian {
 
 /// The value of a pose with derivatives, and for each of them the motion (w, v) with dR = [w] R and dt = v.
 #[inline]
-fn motions<const N: usize>(pose: &Pose<Dual<N>>) -> (Pose, [(Vector3<f64>, Vector3<f64>); N]) {
+fn motions<const N: usize>(pose: &Pose<Dual<N>>) -> (Pose, [Motion; N]) {
     let value = Pose { rotation: pose.rotation.map(|x| x.value()), translation: pose.translation.map(|x| x.value()) };
     let r = &value.rotation;
     let (dr, dt) = (pose.rotation.map(|x| derivatives(&x)), pose.translation.map(|x| derivatives(&x)));

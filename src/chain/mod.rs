@@ -40,7 +40,8 @@ impl Convention {
     /// Pose of a link in the one before, `parent_from_link`.
     ///
     /// `parameters`: offset, d, a, alpha, beta. `reading`: of the joint [rad or m], counted along its axis; added to
-    /// the offset where the joint is revolute, to d where it is prismatic. The formulas stand in the conventions' files.
+    /// the offset where the joint is revolute, to d where it is prismatic. The formulas stand in the conventions'
+    /// files.
     #[inline]
     pub fn link<T: Scalar>(self, kind: JointKind, parameters: &[T; LINK_PARAMETERS], reading: T) -> Pose<T> {
         let &[offset, d, a, alpha, beta] = parameters;

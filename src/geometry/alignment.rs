@@ -90,8 +90,8 @@ mod tests {
         }
     }
 
-    // With n points and noise σ per coordinate the residuals have 3 n - 6 degrees of freedom: over 100 sets of 20 points
-    // Σ r² / σ² is χ² with 5400, mean 5400 and standard deviation 104; 3 σ.
+    // With n points and noise σ per coordinate the residuals have 3 n - 6 degrees of freedom: over 100 sets of 20
+    // points Σ r² / σ² is χ² with 5400, mean 5400 and standard deviation 104; 3 σ.
     #[test]
     fn residuals_of_noisy_points_follow_chi_square() {
         let sigma = 0.01;

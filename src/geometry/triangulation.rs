@@ -27,7 +27,7 @@ pub fn triangulate(cameras_from_world: &[Pose], bearings: &[Vector3<f64>]) -> Op
         vector += across * camera.inverse_transform(&Vector3::zeros());
     }
     let least = matrix.try_symmetric_eigen(f64::EPSILON, 100)?.eigenvalues.min();
-    if !(least > PARALLEL * n as f64) {
+    if least.is_nan() || least <= PARALLEL * n as f64 {
         return None;
     }
     let mut point = matrix.cholesky()?.solve(&vector);
