@@ -23,7 +23,14 @@ fn main() {
             let start = ThreadTime::now();
             let mut solver = handeye::solvers::Solver::new(&graph);
             let verbose = last.is_none() && std::env::var_os("V").is_some();
-            let report = LevenbergMarquardt::default().minimize_with(&mut graph, &mut solver, &mut |i| { if verbose { println!("{} {:.9e}", i.number, i.cost); } std::ops::ControlFlow::Continue(()) }).expect("the problem is well posed");
+            let report = LevenbergMarquardt::default()
+                .minimize_with(&mut graph, &mut solver, &mut |i| {
+                    if verbose {
+                        println!("{} {:.9e}", i.number, i.cost);
+                    }
+                    std::ops::ControlFlow::Continue(())
+                })
+                .expect("the problem is well posed");
             best = best.min(start.elapsed().as_secs_f64());
             last = Some(report);
         }

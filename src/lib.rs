@@ -1,5 +1,6 @@
 //! Learns one generative model of a robot, its features and its cameras from a recording: joints -> poses -> 3D features ->
 //! pixels.
+pub mod calibrate;
 pub mod camera;
 pub mod chain;
 mod error;

@@ -1,4 +1,5 @@
 //! Rigs: robot, cameras and features, what is known of them, what is free and what is held.
+mod model;
 mod names;
 mod paths;
 mod read;
@@ -7,6 +8,7 @@ pub(crate) mod rotations;
 mod types;
 mod write;
 
+pub use model::{Model, ModelCamera, ModelFeature};
 pub(crate) use names::{problem_of_joint_name, problem_of_name};
 pub use paths::{CameraField, JointField, Parameter, matches};
 pub(crate) use read::problem_of_distortion;

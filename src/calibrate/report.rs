@@ -1,0 +1,127 @@
+//! What a calibration did and found, and how good it is.
+use super::CameraErrors;
+use crate::rig::Rig;
+
+/// A learned rig and how it came about.
+#[derive(Clone, Debug)]
+pub struct Calibration {
+    /// The rig with every value filled in, and how it was learned in `fit`.
+    pub rig: Rig,
+    /// How it was learned.
+    pub report: Report,
+}
+
+/// How a rig was learned.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// Samples used.
+    pub samples: usize,
+    /// Detections used.
+    pub observations: usize,
+    /// Detections left out as wrong.
+    pub rejected: usize,
+    /// Root mean square, mean and median of the pixel distances [px].
+    pub rms_px: f64,
+    /// Mean pixel distance [px].
+    pub mean_px: f64,
+    /// Median pixel distance [px].
+    pub median_px: f64,
+    /// The same per camera.
+    pub cameras: Vec<CameraErrors>,
+    /// What was minimised, in order.
+    pub stages: Vec<StageReport>,
+    /// True where the last stage reached a minimum.
+    pub converged: bool,
+    /// What the data cannot determine, in words, and how it was fixed.
+    pub gauge: Vec<String>,
+    /// Samples, images and cameras that do not fit.
+    pub findings: Vec<Finding>,
+    /// Standard deviation of the tip over the recorded workspace; `None` where the data leave the rig open.
+    pub tip: Option<TipDeviation>,
+}
+
+/// One stage of a calibration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StageReport {
+    /// Its name.
+    pub name: String,
+    /// Iterations of the minimiser, over all starts.
+    pub iterations: usize,
+    /// Loss before.
+    pub loss_before: f64,
+    /// Loss after.
+    pub loss_after: f64,
+    /// How long it took [s].
+    pub seconds: f64,
+}
+
+/// Something in the recording that does not fit the rest.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Finding {
+    /// Single detections were left out.
+    Outliers {
+        /// How many.
+        count: usize,
+        /// Of how many.
+        of: usize,
+    },
+    /// The joints of a sample do not lead to what its images show; it was left out.
+    WrongJoints {
+        /// Index of the sample, from 0.
+        sample: usize,
+        /// Its median pixel distance under the learned rig [px].
+        median_px: f64,
+        /// The sample whose images its joints fit, where the two were swapped.
+        swapped_with: Option<usize>,
+    },
+    /// An image does not belong to its sample; it was left out.
+    WrongImage {
+        /// Index of the sample, from 0.
+        sample: usize,
+        /// The camera's name.
+        camera: String,
+        /// Its median pixel distance under the learned rig [px].
+        median_px: f64,
+    },
+    /// A camera was not where it was during the whole recording; its images were left out of the fit of all else.
+    CameraMoved {
+        /// The camera's name.
+        camera: String,
+        /// Largest median shift of an image from where the learned rig puts it [px].
+        largest_px: f64,
+        /// The sample of that image, from 0.
+        sample: usize,
+    },
+}
+
+impl std::fmt::Display for Finding {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Finding::Outliers { count, of } => write!(f, "{count} of {of} detections do not fit and were left out"),
+            Finding::WrongJoints { sample, median_px, swapped_with } => {
+                write!(f, "sample {sample}: its joints do not lead to what the cameras saw ({median_px:.1} px)")?;
+                match swapped_with {
+                    Some(other) => write!(f, "; they fit the images of sample {other}: the two are swapped"),
+                    None => Ok(()),
+                }
+            }
+            Finding::WrongImage { sample, camera, median_px } => {
+                write!(f, "sample {sample}: the image of camera `{camera}` belongs to another pose ({median_px:.1} px)")
+            }
+            Finding::CameraMoved { camera, largest_px, sample } => {
+                write!(f, "camera `{camera}` moved during the recording: sample {sample} is {largest_px:.1} px off")
+            }
+        }
+    }
+}
+
+/// Standard deviation of the tip's position over the recorded samples, as the data leave it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TipDeviation {
+    /// Median over the samples, root of the trace of the covariance.
+    pub median: f64,
+    /// Largest over the samples.
+    pub largest: f64,
+    /// True where it is in metres; false where nothing metric is known and it is in the model's unit.
+    pub metric: bool,
+}
