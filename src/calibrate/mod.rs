@@ -1,5 +1,6 @@
 //! Learns a rig from a recording.
 mod evaluate;
+pub(crate) mod kinematics;
 mod report;
 
 pub use evaluate::{CameraErrors, Errors, Evaluation, evaluate};
