@@ -1,0 +1,118 @@
+//! The learned rig and its account, from the final state.
+use super::evaluate::Errors;
+use super::graph::{State, row};
+use super::outliers::{Verdict, distances};
+use super::setup::Setup;
+use super::{Calibration, CameraErrors, Report, StageReport, TipDeviation};
+use crate::camera::CameraModel;
+use crate::rig::{Fit, Rig};
+use handeye_solvers::Pose;
+use std::collections::BTreeMap;
+
+/// Standard deviations of what was learned.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Deviations {
+    /// By parameter path, as in the rig file's `[fit.sd]`.
+    pub by_path: BTreeMap<String, Vec<f64>>,
+    pub tip: Option<TipDeviation>,
+}
+
+/// Puts everything together.
+pub(crate) fn finish(
+    setup: &Setup,
+    state: &State,
+    verdict: Verdict,
+    stages: Vec<StageReport>,
+    converged: bool,
+    gauge: Vec<String>,
+    deviations: Deviations,
+) -> Calibration {
+    let distances = distances(setup, state);
+    let links: Vec<Vec<Pose>> = setup.joints.iter().map(|joints| state.model.links(joints)).collect();
+    let mut of_camera: Vec<Vec<(f64, bool)>> = vec![Vec::new(); setup.rig.cameras.len()];
+    let mut left_out = vec![0; setup.rig.cameras.len()];
+    let mut used_samples = vec![false; setup.joints.len()];
+    for ((seen, distance), active) in setup.observations.iter().zip(&distances).zip(&verdict.active) {
+        if *active {
+            let point = state.model.in_camera(seen.camera, seen.feature, &links[seen.sample]);
+            let behind = !state.model.cameras[seen.camera].model.is_in_front(&point);
+            of_camera[seen.camera].push((*distance, behind));
+            used_samples[seen.sample] = true;
+        } else {
+            left_out[seen.camera] += 1;
+        }
+    }
+    let total = Errors::new(&of_camera.concat());
+    let cameras = setup
+        .rig
+        .cameras
+        .iter()
+        .zip(of_camera.iter().zip(&left_out))
+        .map(|(camera, (distances, &rejected))| CameraErrors {
+            name: camera.name.clone(),
+            errors: Errors::new(distances),
+            rejected,
+        })
+        .collect();
+    let samples = used_samples.iter().filter(|used| **used).count();
+    let rejected = left_out.iter().sum();
+    let mut rig = learned(setup, state);
+    rig.fit = Some(Fit {
+        samples,
+        observations: total.observations,
+        rejected,
+        rms_px: total.rms_px,
+        mean_px: total.mean_px,
+        gauge: gauge.clone(),
+        sd: deviations.by_path,
+    });
+    let report = Report {
+        samples,
+        observations: total.observations,
+        rejected,
+        rms_px: total.rms_px,
+        mean_px: total.mean_px,
+        median_px: total.median_px,
+        cameras,
+        stages,
+        converged,
+        gauge,
+        findings: verdict.findings,
+        tip: deviations.tip,
+    };
+    Calibration { rig, report }
+}
+
+/// The rig with every value filled in.
+fn learned(setup: &Setup, state: &State) -> Rig {
+    let mut rig = setup.rig.clone();
+    let model = &state.model;
+    rig.robot.base = Some(model.base);
+    for (index, joint) in rig.robot.joints.iter_mut().enumerate() {
+        let [offset, d, a, alpha, beta] = std::array::from_fn(|k| model.parameters[row(index) + k]);
+        joint.offset = Some(wrapped(offset));
+        joint.d = Some(d);
+        joint.a = Some(a);
+        joint.alpha = Some(wrapped(alpha));
+        joint.beta = (joint.beta.is_some() || beta != 0.0).then_some(beta);
+    }
+    for (camera, learned) in rig.cameras.iter_mut().zip(&model.cameras) {
+        let [fx, fy, cx, cy, ..] = learned.intrinsics;
+        camera.model = Some(learned.model);
+        (camera.fx, camera.fy, camera.cx, camera.cy) = (Some(fx), Some(fy), Some(cx), Some(cy));
+        let coefficients = learned.model.distortion().len();
+        camera.distortion =
+            (learned.model != CameraModel::Pinhole).then(|| learned.intrinsics[4..4 + coefficients].to_vec());
+        camera.pose = Some(learned.pose);
+    }
+    for (feature, learned) in rig.features.iter_mut().zip(&model.features) {
+        feature.xyz = Some(learned.xyz.into());
+    }
+    rig
+}
+
+/// The same angle in (-π, π], left alone where it is there already.
+fn wrapped(angle: f64) -> f64 {
+    let turn = std::f64::consts::TAU;
+    if angle.abs() <= 0.5 * turn { angle } else { angle - turn * (angle / turn).round() }
+}

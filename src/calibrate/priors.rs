@@ -1,0 +1,81 @@
+//! What is known before anything is learned, as standard deviations around given values.
+use super::graph::{Priors, row};
+use super::setup::Setup;
+use crate::rig::{CameraField, JointField, Parameter};
+
+/// Where a value is given and nothing is said of how well, it is weakly known: so far off a value from a data sheet or an
+/// earlier calibration may well be.
+const ANGLE: f64 = 0.02; // rad
+const LENGTH: f64 = 0.01; // m
+const CAMERA_ANGLE: f64 = 0.1; // rad
+const CAMERA_LENGTH: f64 = 0.1; // m
+const FOCAL: f64 = 0.03; // share of it
+const CENTRE: f64 = 0.02; // share of the longer side of the image
+const DISTORTION: f64 = 0.1;
+/// The same where intrinsics are guessed.
+const GUESSED_FOCAL: f64 = 0.5;
+const GUESSED_CENTRE: f64 = 0.1;
+const GUESSED_DISTORTION: f64 = 0.3;
+
+impl Priors {
+    /// Around the values of the setup's rig; infinite where a value is unknown.
+    pub fn new(setup: &Setup) -> Priors {
+        let (rig, model) = (&setup.rig, &setup.model);
+        let mut priors = Priors {
+            mean: model.clone(),
+            base: [f64::INFINITY; 6],
+            parameters: vec![f64::INFINITY; model.parameters.len()],
+            cameras: vec![[f64::INFINITY; 6]; model.cameras.len()],
+            intrinsics: vec![[f64::INFINITY; 12]; model.cameras.len()],
+            features: vec![[f64::INFINITY; 3]; model.features.len()],
+        };
+        for parameter in rig.parameters() {
+            let stated = rig.prior_sd(&parameter);
+            // A stated prior needs a value to be around; intrinsics always have one.
+            let given = rig.has_value(&parameter);
+            let sd = |default: f64| if given { stated.unwrap_or(default) } else { f64::INFINITY };
+            match parameter {
+                Parameter::Base => priors.base = pose(sd(ANGLE), sd(LENGTH)),
+                Parameter::JointField { joint, field } => {
+                    let (coordinate, default) = match field {
+                        JointField::Offset => (0, ANGLE),
+                        JointField::D => (1, LENGTH),
+                        JointField::A => (2, LENGTH),
+                        JointField::Alpha => (3, ANGLE),
+                        JointField::Beta => (4, ANGLE),
+                    };
+                    priors.parameters[row(joint) + coordinate] = sd(default);
+                }
+                Parameter::CameraPose(camera) => priors.cameras[camera] = pose(sd(CAMERA_ANGLE), sd(CAMERA_LENGTH)),
+                Parameter::CameraField { camera, field } => {
+                    let known = setup.intrinsics[camera];
+                    let k = &model.cameras[camera].intrinsics;
+                    let side = rig.cameras[camera].size.map_or(2.0 * k[2].max(k[3]), |[w, h]| f64::from(w.max(h)));
+                    let focal = if known.focal { FOCAL } else { GUESSED_FOCAL };
+                    let centre = if known.centre { CENTRE } else { GUESSED_CENTRE };
+                    let distortion = if known.distortion { DISTORTION } else { GUESSED_DISTORTION };
+                    let sigmas = &mut priors.intrinsics[camera];
+                    match field {
+                        CameraField::Fx => sigmas[0] = stated.unwrap_or(focal * k[0]),
+                        CameraField::Fy => sigmas[1] = stated.unwrap_or(focal * k[1]),
+                        CameraField::Cx => sigmas[2] = stated.unwrap_or(centre * side),
+                        CameraField::Cy => sigmas[3] = stated.unwrap_or(centre * side),
+                        CameraField::Distortion => sigmas[4..].fill(stated.unwrap_or(distortion)),
+                    }
+                }
+                Parameter::FeatureXyz(feature) => priors.features[feature] = [sd(LENGTH); 3],
+            }
+        }
+        // A joint without a beta has 0, known as well as its alpha where that is given.
+        for (index, joint) in rig.robot.joints.iter().enumerate().filter(|(_, joint)| joint.beta.is_none()) {
+            if joint.alpha.is_some() {
+                priors.parameters[row(index) + 4] = priors.parameters[row(index) + 3];
+            }
+        }
+        priors
+    }
+}
+
+fn pose(angle: f64, length: f64) -> [f64; 6] {
+    [angle, angle, angle, length, length, length]
+}
