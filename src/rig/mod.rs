@@ -1,4 +1,5 @@
 //! Rigs: robot, cameras and features, what is known of them, what is free and what is held.
+pub mod catalog;
 mod model;
 mod names;
 mod paths;

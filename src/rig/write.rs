@@ -140,6 +140,9 @@ fn write_fit(table: &mut dyn TableLike, fit: &Fit) {
     set(table, "rms_px", number(fit.rms_px));
     set(table, "mean_px", number(fit.mean_px));
     set_texts(table, "gauge", &fit.gauge);
+    if fit.sd.is_empty() {
+        return;
+    }
     let mut deviations = Table::new();
     comment_on(Some(&mut deviations), &format!("\n{DEVIATIONS}"));
     for (path, sd) in &fit.sd {

@@ -10,7 +10,11 @@ pub(super) fn malformed(file: &str, line: usize, text: &[u8], error: &serde_json
     let read = error.column().min(text.len());
     let message = error.to_string();
     let message = message.rfind(" at line ").map_or(message.as_str(), |end| &message[..end]);
-    let at_syntax = read.saturating_sub(1);
+    // A word that is no literal is told at its first letter.
+    let at_syntax = match message {
+        "expected ident" => start_of_value(text, read, message),
+        _ => read.saturating_sub(1),
+    };
     let (offset, problem) = match error.classify() {
         Category::Eof if is_cut_off => (text.len(), "the last line is cut off".to_owned()),
         Category::Eof => (text.len(), format!("the line ends in the middle of a sample ({message})")),

@@ -13,12 +13,14 @@ pub(super) fn write_list(
     names: &[&str],
     mut write: impl FnMut(&mut dyn TableLike, usize, bool),
 ) -> bool {
-    let old = parent.get_mut(key);
     if names.is_empty() {
-        parent.remove(key);
+        // An empty list that the author wrote stays as it is.
+        if parent.get(key).is_some_and(|list| list.as_array().is_none_or(|array| !array.is_empty())) {
+            parent.remove(key);
+        }
         return false;
     }
-    match old {
+    match parent.get_mut(key) {
         Some(Item::ArrayOfTables(tables)) => {
             write_tables(tables, names, &mut write);
             false

@@ -55,7 +55,9 @@ impl Writer<'_> {
     /// The same for a pose. A table that stands there is kept, with its comments; a rotation becomes a quaternion.
     pub(super) fn put_pose(&mut self, key: &str, before: &Option<Pose>, now: &Option<Pose>) {
         if let (Some(before), Some(now), false) = (before, now, self.fresh)
-            && let Some(table) = self.table.get_mut(key).and_then(Item::as_table_like_mut)
+            && let Some(item) = self.table.get_mut(key)
+            && (before.rotation == now.rotation || !item.is_value())
+            && let Some(table) = item.as_table_like_mut()
         {
             if before.translation != now.translation {
                 set(table, "xyz", numbers(now.translation.as_slice()));

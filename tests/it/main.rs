@@ -1,0 +1,4 @@
+//! What users are promised, one file per promise.
+mod malformed_input;
+mod recording_files;
+mod rig_files;
