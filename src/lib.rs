@@ -8,6 +8,7 @@ pub mod factors;
 pub mod geometry;
 pub mod recording;
 pub mod rig;
+pub mod simulate;
 
 pub use error::Error;
 pub use handeye_solvers as solvers;

@@ -5,4 +5,5 @@ mod names;
 mod types;
 
 pub use jsonl::Reader;
+pub(crate) use names::natural_order;
 pub use types::*;

@@ -40,7 +40,7 @@ impl Names {
 }
 
 /// Digits count as numbers: `f2` comes before `f10`.
-pub(super) fn natural_order(a: &str, b: &str) -> Ordering {
+pub(crate) fn natural_order(a: &str, b: &str) -> Ordering {
     let (mut left, mut right) = (a, b);
     while let (Some(l), Some(r)) = (left.chars().next(), right.chars().next()) {
         let order = if l.is_ascii_digit() && r.is_ascii_digit() {

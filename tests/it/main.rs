@@ -2,3 +2,4 @@
 mod malformed_input;
 mod recording_files;
 mod rig_files;
+mod simulate;

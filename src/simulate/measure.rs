@@ -1,0 +1,97 @@
+//! From what is true to what is read: noise, missed detections, gross outliers.
+use super::SimulateOptions;
+use crate::recording::{Detection, RecordedCamera, Recording, Sample};
+use crate::rig::{Noise, PoseNoise, Rig};
+use handeye_solvers::Pose;
+use handeye_solvers::manifold::so3;
+use nalgebra::Vector3;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+/// Streams of random numbers beside that of the motions, which is 0.
+const NOISE: u64 = 1;
+const DETECTION: u64 = 2;
+
+/// A recording with noise, and how many of its detections are missing or wrong.
+pub(super) struct Measured {
+    pub recording: Recording,
+    pub missed: usize,
+    pub outliers: usize,
+}
+
+/// Adds the rig's noise to a true recording; leaves out what is missed, and what a rig without noise for it does not record.
+pub(super) fn measure(truth: &Recording, rig: &Rig, options: &SimulateOptions) -> Measured {
+    let stream = |number| {
+        let mut random = ChaCha8Rng::seed_from_u64(options.seed);
+        random.set_stream(number);
+        random
+    };
+    let (mut noise, mut detector) = (stream(NOISE), stream(DETECTION));
+    let mut measured = Measured { recording: truth.clone(), missed: 0, outliers: 0 };
+    let Measured { recording, missed, outliers } = &mut measured;
+    for sample in &mut recording.samples {
+        blur(sample, &rig.noise, &mut noise);
+        sample.pixels.retain_mut(|detection| match detect(detection, &truth.cameras, options, &mut detector) {
+            Fate::Seen => true,
+            Fate::Outlier => {
+                *outliers += 1;
+                true
+            }
+            Fate::Missed => {
+                *missed += 1;
+                false
+            }
+        });
+    }
+    measured
+}
+
+/// True where a pose is measured with an error, and so recorded.
+pub(super) fn is_noisy(noise: PoseNoise) -> bool {
+    noise.xyz > 0.0 || noise.rot > 0.0
+}
+
+/// Gaussian noise on everything that a sample holds.
+fn blur(sample: &mut Sample, noise: &Noise, random: &mut ChaCha8Rng) {
+    let mut normal = |sd: f64| -> f64 { sd * random.sample::<f64, _>(StandardNormal) };
+    sample.joints.iter_mut().flatten().for_each(|joint| *joint += normal(noise.joints));
+    sample.joint_action.iter_mut().flatten().for_each(|joint| *joint += normal(noise.joint_action));
+    let mut moved = |pose: Pose, noise: PoseNoise| {
+        let w = Vector3::from_fn(|_, _| normal(noise.rot));
+        let v = Vector3::from_fn(|_, _| normal(noise.xyz));
+        Pose { rotation: so3::exp(&w) * pose.rotation, translation: pose.translation + v }
+    };
+    sample.pose = sample.pose.filter(|_| is_noisy(noise.pose)).map(|pose| moved(pose, noise.pose));
+    // On A itself: the residual of eq. 12 of the paper, P_next P⁻¹ against A, is white.
+    sample.pose_action = sample.pose_action.map(|action| moved(action, noise.pose_action));
+    for detection in &mut sample.pixels {
+        detection.pixel = detection.pixel.map(|coordinate| coordinate + normal(noise.pixels));
+    }
+}
+
+enum Fate {
+    Seen,
+    Missed,
+    Outlier,
+}
+
+/// Whether a detection is missed, or replaced by another place of the image. Every detection takes as many random numbers,
+/// so what is missed with a small probability is missed with a larger one too.
+fn detect(
+    detection: &mut Detection,
+    cameras: &[RecordedCamera],
+    options: &SimulateOptions,
+    random: &mut ChaCha8Rng,
+) -> Fate {
+    let [misses, errs, u, v] = std::array::from_fn(|_| random.random::<f64>());
+    if misses < options.missed {
+        return Fate::Missed;
+    }
+    if errs < options.outliers {
+        let [width, height] = cameras[detection.camera as usize].size.unwrap_or_default().map(f64::from);
+        detection.pixel = [u * width - 0.5, v * height - 0.5];
+        return Fate::Outlier;
+    }
+    Fate::Seen
+}

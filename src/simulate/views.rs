@@ -1,0 +1,103 @@
+//! What the cameras of a complete rig see of its features.
+use super::SimulateOptions;
+use crate::Error;
+use crate::recording::Detection;
+use crate::rig::{Model, Rig};
+use handeye_solvers::Pose;
+
+/// Cosine of the largest angle by which a pixel's own direction may differ from the feature's: where a distortion has
+/// folded back, a feature outside the image seems to be inside, and the two differ by far more.
+const SAME_DIRECTION: f64 = 1.0 - 1e-9;
+
+/// The cameras, their images, and how much of the features has to be in them.
+pub(super) struct Views<'a> {
+    pub model: &'a Model,
+    sizes: Vec<[f64; 2]>,
+    /// Features that every camera has to have in view.
+    pub per_camera: usize,
+    /// Features in view, summed over the cameras.
+    pub in_total: usize,
+}
+
+/// By how much a position misses what has to be in view; ordered, so that a walk can descend it.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+pub(super) struct Shortfall {
+    /// Features that are missing.
+    pub features: usize,
+    /// Mean angle between the optical axes and the features out of view [rad]: where to go while none is seen.
+    angle: f64,
+}
+
+impl<'a> Views<'a> {
+    pub fn new(rig: &Rig, model: &'a Model, options: &SimulateOptions) -> Result<Self, Error> {
+        for (count, what) in [(rig.cameras.len(), "cameras"), (rig.features.len(), "features")] {
+            if count == 0 {
+                return Err(Error::Unusable(format!("the rig has no {what}, so nothing would be seen")));
+            }
+        }
+        let size = |camera: &crate::rig::Camera| match camera.size {
+            Some(size) => Ok(size.map(f64::from)),
+            None => Err(Error::Unusable(format!(
+                "the rig is not complete: it has no value for `size` of camera `{}`",
+                camera.name
+            ))),
+        };
+        let n_features = rig.features.len();
+        Ok(Views {
+            model,
+            sizes: rig.cameras.iter().map(size).collect::<Result<_, _>>()?,
+            per_camera: (options.in_view * n_features as f64).ceil() as usize,
+            in_total: options.min_features.min(n_features * rig.cameras.len()),
+        })
+    }
+
+    /// Exact pixels of all features in view, ordered by camera, then by the rig's features.
+    pub fn detections(&self, joints: &[f64]) -> Vec<Detection> {
+        let links = self.model.links(joints);
+        let mut detections = Vec::new();
+        for camera in 0..self.sizes.len() {
+            for feature in 0..self.model.features.len() {
+                if let Some(pixel) = self.pixel(camera, feature, &links) {
+                    detections.push(Detection { camera: camera as u32, feature: feature as u32, pixel });
+                }
+            }
+        }
+        detections
+    }
+
+    /// By how much a position misses what has to be in view. `in_view`: how many features each camera sees.
+    pub fn shortfall(&self, joints: &[f64], in_view: &mut [usize]) -> Shortfall {
+        let links = self.model.links(joints);
+        let (mut angle, mut n_hidden) = (0.0, 0);
+        for (camera, seen) in in_view.iter_mut().enumerate() {
+            *seen = 0;
+            for feature in 0..self.model.features.len() {
+                if self.pixel(camera, feature, &links).is_some() {
+                    *seen += 1;
+                } else {
+                    let point = self.model.in_camera(camera, feature, &links);
+                    angle += point.xy().norm().atan2(point.z);
+                    n_hidden += 1;
+                }
+            }
+        }
+        let per_camera: usize = in_view.iter().map(|&seen| self.per_camera.saturating_sub(seen)).sum();
+        let in_total = self.in_total.saturating_sub(in_view.iter().sum());
+        Shortfall { features: per_camera.max(in_total), angle: angle / f64::from(n_hidden.max(1)) }
+    }
+
+    /// Where a camera sees a feature, if it does.
+    fn pixel(&self, camera: usize, feature: usize, links: &[Pose]) -> Option<[f64; 2]> {
+        let point = self.model.in_camera(camera, feature, links);
+        let [width, height] = self.sizes[camera];
+        let camera = &self.model.cameras[camera];
+        let [u, v] = camera.model.project(&camera.intrinsics, &point);
+        // The centre of the first pixel is 0, so the image begins half a pixel before it.
+        let is_inside = (-0.5..width - 0.5).contains(&u) && (-0.5..height - 0.5).contains(&v);
+        if !is_inside || !camera.model.is_in_front(&point) {
+            return None;
+        }
+        let ray = camera.model.unproject(&camera.intrinsics, [u, v])?;
+        (ray.dot(&point) >= SAME_DIRECTION * point.norm()).then_some([u, v])
+    }
+}
