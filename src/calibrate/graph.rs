@@ -131,8 +131,8 @@ pub(crate) fn build(
             }),
             Parent::Tip | Parent::Link(_) => {
                 let upto = if let Parent::Link(joint) = parent { joint + 1 } else { n };
-                let joints = *joints
-                    .get_or_insert_with(|| graph.held(DynamicVector::from_column_slice(&setup.joints[sample])));
+                let joints =
+                    *joints.get_or_insert_with(|| graph.held(DynamicVector::from_column_slice(&setup.joints[sample])));
                 let link = *links[upto].get_or_insert_with(|| {
                     graph.derive(ForwardKinematics { chain: chain.clone(), upto }, (base, parameters, joints))
                 });

@@ -64,13 +64,8 @@ fn look(setup: &Setup, priors: &Priors, seed: u64, stages: &mut Stages<'_>) -> R
     }
     let focal = model.cameras.iter().map(|camera| camera.intrinsics[0]).fold(f64::INFINITY, f64::min);
     let threshold = (THRESHOLD * setup.sigma()).max(THRESHOLD_PX) / focal;
-    let views = Views {
-        samples: &samples,
-        cameras: model.cameras.len(),
-        features: model.features.len(),
-        threshold,
-        seed,
-    };
+    let views =
+        Views { samples: &samples, cameras: model.cameras.len(), features: model.features.len(), threshold, seed };
     let scenes = reconstruct(&views);
     let mut best: Option<(f64, Seen)> = None;
     let mut results = Vec::new();
@@ -172,7 +167,8 @@ fn learn_chain(
     let mut tips: Vec<Pose> = samples.iter().map(|&sample| state.tips[sample]).collect();
     let rotations: Vec<_> = tips.iter().map(|tip| tip.rotation).collect();
     let started = std::time::Instant::now();
-    let undetermined = || Error::NotEnoughData("the joints' readings and the seen motion of the tip do not fit together".into());
+    let undetermined =
+        || Error::NotEnoughData("the joints' readings and the seen motion of the tip do not fit together".into());
     let axes = find_axes(kinds, &joints, &rotations, 0.02, seed).ok_or_else(undetermined)?;
     let mut lines = find_lines(kinds, &axes, &joints, &tips).ok_or_else(undetermined)?;
     if let Some(unit) = lines.unit {

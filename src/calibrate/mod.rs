@@ -85,9 +85,8 @@ pub fn calibrate(
         // What single detections do is left to the loss until the end; images and samples that are wrong go at once.
         left_out = setup.observations.iter().map(|seen| verdict.moved[seen.camera]).collect();
     }
-    let report = stages.minimize("end to end", &setup, &mut state, &freedom, &priors, Loss::Squared, |index| {
-        verdict.active[index]
-    })?;
+    let report = stages
+        .minimize("end to end", &setup, &mut state, &freedom, &priors, Loss::Squared, |index| verdict.active[index])?;
     let converged = report.termination.converged();
     let deviations = finish::Deviations::default();
     Ok(finish::finish(&setup, &state, verdict, stages.reports, converged, gauge, deviations))

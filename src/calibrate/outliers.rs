@@ -92,9 +92,10 @@ fn moved_cameras(
     let of_camera = |camera: usize| medians.keys().filter(move |key| key.1 == camera);
     let share_of_bad = |camera: usize| {
         // Only where another camera says that the sample's joints are right.
-        let others = |sample: usize| (0..n_cameras).any(|other| {
-            other != camera && medians.contains_key(&(sample, other)) && !bad(&(sample, other))
-        });
+        let others = |sample: usize| {
+            (0..n_cameras)
+                .any(|other| other != camera && medians.contains_key(&(sample, other)) && !bad(&(sample, other)))
+        };
         let judged: Vec<_> = of_camera(camera).filter(|key| others(key.0)).collect();
         let wrong = judged.iter().filter(|key| bad(key)).count();
         (wrong >= 3).then(|| wrong as f64 / judged.len() as f64).unwrap_or(0.0)

@@ -89,9 +89,11 @@ impl Setup {
 
     /// True where every row of the chain is given.
     pub fn chain_is_known(&self) -> bool {
-        self.rig.robot.joints.iter().all(|joint| {
-            joint.offset.is_some() && joint.d.is_some() && joint.a.is_some() && joint.alpha.is_some()
-        })
+        self.rig
+            .robot
+            .joints
+            .iter()
+            .all(|joint| joint.offset.is_some() && joint.d.is_some() && joint.a.is_some() && joint.alpha.is_some())
     }
 
     /// Standard deviation of a pixel coordinate [px].
@@ -171,7 +173,9 @@ fn complete_camera(
 fn seen_size(camera: &Camera, recording: &Recording) -> Option<[f64; 2]> {
     let index = recording.cameras.iter().position(|recorded| recorded.name == camera.name)? as u32;
     let seen = recording.samples.iter().flat_map(|sample| &sample.pixels).filter(|seen| seen.camera == index);
-    seen.map(|seen| seen.pixel).reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]).map(|most| most.map(|x| x.max(1.0) + 1.0))
+    seen.map(|seen| seen.pixel)
+        .reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])
+        .map(|most| most.map(|x| x.max(1.0) + 1.0))
 }
 
 /// Every parameter that is held must have a value (a base that is left out is the identity).

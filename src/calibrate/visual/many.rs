@@ -118,42 +118,47 @@ fn place_objects(views: &Views<'_>, scene: &mut Scene, points: &[Points]) -> Opt
         return None;
     }
     scene.objects[reference] = Some(Pose::identity());
-    // Sum and count of each feature's positions in the object's frame.
-    let mut structure: BTreeMap<usize, (Vector3<f64>, f64)> =
-        points[reference].iter().map(|(&feature, &point)| (feature, (point, 1.0))).collect();
+    let mut structure: Structure = points[reference].iter().map(|(&feature, &point)| (feature, (point, 1.0))).collect();
     let mut waiting: Vec<usize> = (0..points.len()).filter(|&sample| sample != reference).collect();
     loop {
-        let shared = |&sample: &usize| points[sample].keys().filter(|feature| structure.contains_key(feature)).count();
-        waiting.sort_by_key(|sample| (std::cmp::Reverse(shared(sample)), *sample));
-        let placed = waiting.iter().position(|&sample| {
-            if shared(&sample) < 3 {
-                return false;
+        let before = waiting.len();
+        let shared = |sample: usize| points[sample].keys().filter(|feature| structure.contains_key(feature)).count();
+        waiting.sort_by_cached_key(|&sample| (std::cmp::Reverse(shared(sample)), sample));
+        waiting.retain(|&sample| match place(&points[sample], &mut structure, views.seed) {
+            Some(pose) => {
+                scene.objects[sample] = Some(pose);
+                false
             }
-            let (mut from, mut to) = (Vec::new(), Vec::new());
-            for (feature, point) in &points[sample] {
-                if let Some((sum, count)) = structure.get(feature) {
-                    from.push(sum / *count);
-                    to.push(*point);
-                }
-            }
-            let Some(pose) = align_robust(&from, &to, views.seed) else { return false };
-            scene.objects[sample] = Some(pose);
-            for (&feature, point) in &points[sample] {
-                let entry = structure.entry(feature).or_insert((Vector3::zeros(), 0.0));
-                entry.0 += pose.inverse_transform(point);
-                entry.1 += 1.0;
-            }
-            true
+            None => true,
         });
-        match placed {
-            Some(index) => waiting.remove(index),
-            None => break,
-        };
+        if waiting.len() == before {
+            break;
+        }
     }
     for (feature, (sum, count)) in structure {
         scene.features[feature] = Some(sum / count);
     }
     Some(())
+}
+
+/// Sum and count of each feature's positions in the object's frame.
+type Structure = BTreeMap<usize, (Vector3<f64>, f64)>;
+
+/// The object's pose in a sample that shares three or more features with the structure, which then gains the sample's.
+fn place(points: &Points, structure: &mut Structure, seed: u64) -> Option<Pose> {
+    let known =
+        |(feature, point): (&usize, &Vector3<f64>)| structure.get(feature).map(|(sum, count)| (sum / *count, *point));
+    let (from, to): (Vec<_>, Vec<_>) = points.iter().filter_map(known).unzip();
+    if from.len() < 3 {
+        return None;
+    }
+    let pose = align_robust(&from, &to, seed)?;
+    for (&feature, point) in points {
+        let entry = structure.entry(feature).or_insert((Vector3::zeros(), 0.0));
+        entry.0 += pose.inverse_transform(point);
+        entry.1 += 1.0;
+    }
+    Some(pose)
 }
 
 /// Alignment that up to a third of wrong points does not spoil: the triple with the least median distance, then all points

@@ -93,7 +93,11 @@ fn structures(views: &Views<'_>, samples: &[Vec<Sighting>], (a, b): (usize, usiz
         let mut errors: Vec<f64> = judged.map(|sample| error(sample).unwrap_or(1.0)).collect();
         Start { features, error: crate::calibrate::evaluate::median(&mut errors) }
     };
-    candidates.into_iter().map(|candidate| build(candidate.b_from_a)).filter(|start| start.features.len() >= 4).collect()
+    candidates
+        .into_iter()
+        .map(|candidate| build(candidate.b_from_a))
+        .filter(|start| start.features.len() >= 4)
+        .collect()
 }
 
 fn known(features: &BTreeMap<usize, Vector3<f64>>, sample: &[Sighting]) -> (Vec<Vector3<f64>>, Vec<Vector3<f64>>) {
@@ -102,7 +106,8 @@ fn known(features: &BTreeMap<usize, Vector3<f64>>, sample: &[Sighting]) -> (Vec<
 }
 
 fn median_angle(pose: &Pose, points: &[Vector3<f64>], bearings: &[Vector3<f64>]) -> f64 {
-    let angle = |(point, bearing): (&Vector3<f64>, &Vector3<f64>)| pose.transform(point).normalize().cross(bearing).norm();
+    let angle =
+        |(point, bearing): (&Vector3<f64>, &Vector3<f64>)| pose.transform(point).normalize().cross(bearing).norm();
     crate::calibrate::evaluate::median(&mut points.iter().zip(bearings).map(angle).collect::<Vec<_>>())
 }
 

@@ -1,0 +1,137 @@
+//! How often a rig is learned from nothing, and how well: held-out error over the floor of the noise, 100 seeds each.
+//!
+//! `cargo bench --bench accuracy -- [--seeds N] [SETTING]...`
+use handeye::calibrate::{Options, calibrate, evaluate};
+use handeye::rig::{Estimate, Rig, catalog};
+use handeye::simulate::{SimulateOptions, random_rig, simulate};
+use std::ops::ControlFlow;
+
+/// One row of the table: a rig per seed, what is recorded of it, and the bar.
+struct Setting {
+    name: &'static str,
+    rig: fn(u64) -> Rig,
+    samples: usize,
+    missed: f64,
+    outliers: f64,
+    /// Held-out rms over the floor, and how many of 100 seeds must be within it.
+    bar: (f64, usize),
+}
+
+const SETTINGS: [Setting; 8] = [
+    Setting {
+        name: "six50",
+        rig: |seed| random_rig(6, 2, 12, seed),
+        samples: 50,
+        missed: 0.0,
+        outliers: 0.0,
+        bar: (1.05, 99),
+    },
+    Setting {
+        name: "six30",
+        rig: |seed| random_rig(6, 2, 12, seed),
+        samples: 30,
+        missed: 0.0,
+        outliers: 0.0,
+        bar: (1.10, 95),
+    },
+    Setting {
+        name: "seven",
+        rig: |seed| random_rig(7, 3, 12, seed),
+        samples: 80,
+        missed: 1.0 / 3.0,
+        outliers: 0.0,
+        bar: (1.05, 99),
+    },
+    Setting {
+        name: "one",
+        rig: |seed| random_rig(6, 1, 12, seed),
+        samples: 80,
+        missed: 0.0,
+        outliers: 0.0,
+        bar: (1.05, 90),
+    },
+    Setting { name: "ur5", rig: ur5, samples: 50, missed: 0.0, outliers: 0.0, bar: (1.05, 99) },
+    Setting { name: "ur5-30", rig: ur5, samples: 30, missed: 0.0, outliers: 0.0, bar: (1.10, 95) },
+    Setting {
+        name: "outliers",
+        rig: |seed| random_rig(6, 2, 12, seed),
+        samples: 50,
+        missed: 0.0,
+        outliers: 0.05,
+        bar: (1.05, 99),
+    },
+    Setting { name: "ur5-outliers", rig: ur5, samples: 50, missed: 0.0, outliers: 0.05, bar: (1.05, 99) },
+];
+
+fn ur5(_: u64) -> Rig {
+    catalog::rig("ur5").expect("the shipped rig is valid")
+}
+
+fn main() {
+    let mut names = Vec::new();
+    let (mut seeds, mut only, mut verbose) = (100, None, false);
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--seeds" => seeds = arguments.next().and_then(|n| n.parse().ok()).unwrap_or(seeds),
+            "--seed" => only = arguments.next().and_then(|n| n.parse::<u64>().ok()),
+            "--verbose" => verbose = true,
+            "--bench" => {}
+            name => names.push(name.to_owned()),
+        }
+    }
+    println!("{:14} {:>8} {:>8} {:>8} {:>8}  within  bar", "setting", "median", "90 %", "largest", "s/rig");
+    for setting in SETTINGS.iter().filter(|setting| names.is_empty() || names.iter().any(|name| name == setting.name)) {
+        let mut ratios = Vec::new();
+        let range = only.map_or(0..seeds, |seed| seed..seed + 1);
+        let started = std::time::Instant::now();
+        for seed in range.clone() {
+            let ratio = run(setting, seed, verbose);
+            if verbose || ratio > setting.bar.0 {
+                println!("    seed {seed}: {ratio:.3}");
+            }
+            ratios.push(ratio);
+        }
+        let seconds = started.elapsed().as_secs_f64() / ratios.len() as f64;
+        let within = ratios.iter().filter(|ratio| **ratio <= setting.bar.0).count();
+        ratios.sort_by(f64::total_cmp);
+        let n = ratios.len();
+        println!(
+            "{:14} {:8.3} {:8.3} {:8.3} {:8.3}  {within} of {n} within {}, wanted {} of 100",
+            setting.name,
+            ratios[n / 2],
+            ratios[(9 * n / 10).min(n - 1)],
+            ratios[n - 1],
+            seconds,
+            setting.bar.0,
+            setting.bar.1,
+        );
+    }
+}
+
+/// Held-out rms over the floor, infinite where nothing was learned.
+fn run(setting: &Setting, seed: u64, verbose: bool) -> f64 {
+    let truth = (setting.rig)(seed);
+    let record = |samples, seed, missed, outliers| {
+        let options = SimulateOptions { samples, seed, missed, outliers, ..Default::default() };
+        simulate(&truth, &options).expect("the rig is complete and in view").recording
+    };
+    let training = record(setting.samples, 2 * seed, setting.missed, setting.outliers);
+    let fresh = record(100, 2 * seed + 1, 0.0, 0.0);
+    let forgotten = Rig { noise: truth.noise, estimate: Estimate::default(), ..Rig::default() };
+    match calibrate(&forgotten, &training, &Options::default(), &mut |_| ControlFlow::Continue(())) {
+        Ok(learned) => {
+            if verbose {
+                println!("{:#?}", learned.report.stages);
+                println!("{:?} {:?}", learned.report.gauge, learned.report.findings);
+                println!("training rms {}", learned.report.rms_px);
+            }
+            let evaluation = evaluate(&learned.rig, &fresh).expect("the learned rig is complete");
+            evaluation.total.rms_px / (truth.noise.pixels * 2.0_f64.sqrt())
+        }
+        Err(error) => {
+            println!("    seed {seed}: {error}");
+            f64::INFINITY
+        }
+    }
+}
