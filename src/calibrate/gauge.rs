@@ -25,7 +25,7 @@ pub(crate) fn end_to_end(setup: &Setup, state: &mut State, priors: &Priors) -> (
     let unknown = |joint: usize, coordinate: usize| priors.parameters[row(joint) + coordinate].is_infinite();
     let names = ["offset", "d", "a", "alpha", "beta"];
     let last = joints.len() - 1;
-    let mut hold = |joint: usize, coordinates: &[usize], why: &str, words: &mut Vec<String>, freedom: &mut Freedom| {
+    let hold = |joint: usize, coordinates: &[usize], why: &str, words: &mut Vec<String>, freedom: &mut Freedom| {
         let held: Vec<&str> = coordinates
             .iter()
             .filter(|&&coordinate| unknown(joint, coordinate) && !freedom.parameters[row(joint) + coordinate])
@@ -56,22 +56,16 @@ pub(crate) fn end_to_end(setup: &Setup, state: &mut State, priors: &Priors) -> (
         // The row that holds the angle between the axes of this joint and the next.
         let twist = if convention == Convention::ModifiedDh { joint + 1 } else { joint };
         let parallel = joint < last && state.model.parameters[row(twist) + 3].sin().abs() < PARALLEL;
-        let beta = row(twist.min(last)) + 4;
-        if parallel && joints[twist].beta.is_none() && !is_alpha_fixed(setup, twist) {
-            hold(
-                joint,
-                &[1],
-                "its axis is nearly parallel to the next, and beta stands in for d",
-                &mut words,
-                &mut freedom,
-            );
-        } else if joints[twist.min(last)].beta.is_none() {
-            freedom.parameters[beta] = true;
+        // With a given d, the given rows stand as they are: a beta comes in only where the file has one.
+        if parallel && unknown(joint, 1) && joints[twist].beta.is_none() && !is_alpha_fixed(setup, twist) {
+            let why = "its axis is nearly parallel to the next, and beta stands in for d";
+            hold(joint, &[1], why, &mut words, &mut freedom);
+        } else if joint < last && joints[twist].beta.is_none() {
+            freedom.parameters[row(twist) + 4] = true;
         }
     }
-    if convention == Convention::ModifiedDh {
-        freedom.parameters[4] |= joints[0].beta.is_none();
-    }
+    let ends = if convention == Convention::ModifiedDh { 0 } else { last };
+    freedom.parameters[row(ends) + 4] |= joints[ends].beta.is_none();
     if !length_is_known(setup) {
         let lengths = (0..joints.len()).flat_map(|joint| [row(joint) + 1, row(joint) + 2]);
         let size = |&index: &usize| state.model.parameters[index].abs();

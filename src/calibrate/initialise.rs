@@ -72,6 +72,10 @@ fn look(setup: &Setup, priors: &Priors, seed: u64, stages: &mut Stages<'_>) -> R
     for scene in scenes {
         let Some(mut seen) = seen_from(setup, &scene, on_arm) else { continue };
         let mut freedom = Freedom::all(setup, false);
+        // Images alone tell little of intrinsics: those that are given are trusted until the chain is there.
+        for (held, known) in freedom.intrinsics.iter_mut().zip(&setup.intrinsics) {
+            *held = std::array::from_fn(|i| held[i] || i >= 2 || known.focal);
+        }
         freedom.cameras[seen.cameras.iter().position(|placed| *placed).unwrap_or(0)] = [true; 6];
         let reference = seen.placed.iter().position(|placed| *placed).unwrap_or(0);
         freedom.tips[reference] = true;

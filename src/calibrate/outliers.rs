@@ -3,38 +3,53 @@ use super::Finding;
 use super::evaluate::median;
 use super::graph::State;
 use super::setup::Setup;
-use std::collections::BTreeMap;
+use nalgebra::Vector2;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What is left out, and why.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct Verdict {
     /// Observations that take part.
     pub active: Vec<bool>,
     pub findings: Vec<Finding>,
     /// Cameras that moved: their images take no part in the fit of anything else.
     pub moved: Vec<bool>,
+    /// Observations of moved cameras, wrong images and samples with wrong joints.
+    pub left_out: Vec<bool>,
 }
 
-/// A detection is wrong beyond this many standard deviations of the fit: one in 260,000 good ones is.
-const DETECTION: f64 = 5.0;
+impl Verdict {
+    /// Everything takes part.
+    pub fn all(setup: &Setup) -> Verdict {
+        let n = setup.observations.len();
+        Verdict {
+            active: vec![true; n],
+            findings: Vec::new(),
+            moved: vec![false; setup.rig.cameras.len()],
+            left_out: vec![false; n],
+        }
+    }
+}
 
-/// An image is wrong where its median is beyond this many.
-const IMAGE: f64 = 6.0;
+/// A detection is wrong beyond this many standard deviations; those between are left to the loss.
+const DETECTION: f64 = 10.0;
 
-/// A camera moved where this share of its images is wrong and their samples' other images are not.
-const MOVED: f64 = 0.3;
+/// An image belongs to another pose where its median is beyond this many: less may be a robot that does not repeat itself.
+const IMAGE: f64 = 10.0;
+
+/// Images count as shifted where the squares of their mean errors are this many times what noise explains.
+const SHIFTED: f64 = 4.0;
 
 /// Median of |x| for a two-dimensional Gaussian of unit variance per axis.
 const MEDIAN_DISTANCE: f64 = 1.177_410_022_515_474_6;
 
 /// Judges every observation by its distance [px] under a robust fit.
 ///
-/// The fit's own scatter, from the median distance, is the yardstick, so that a wrongly stated noise does not make good
-/// data bad; it is no less than half of the stated one.
-pub(crate) fn judge(setup: &Setup, state: &State, left_out: &[bool]) -> Verdict {
+/// The yardstick is the stated noise, or the fit's own scatter (from the median distance) where that is larger.
+pub(crate) fn judge(setup: &Setup, state: &State, left_out: &[bool], moved: &[bool]) -> Verdict {
     let distances = distances(setup, state);
     let mut counted: Vec<f64> = distances.iter().zip(left_out).filter(|(_, out)| !**out).map(|(d, _)| *d).collect();
-    let sigma = (median(&mut counted) / MEDIAN_DISTANCE).max(0.5 * setup.sigma());
+    let sigma = (median(&mut counted) / MEDIAN_DISTANCE).max(setup.sigma());
     let mut images: BTreeMap<(usize, usize), Vec<f64>> = BTreeMap::new();
     for (seen, distance) in setup.observations.iter().zip(&distances) {
         images.entry((seen.sample, seen.camera)).or_default().push(*distance);
@@ -44,15 +59,19 @@ pub(crate) fn judge(setup: &Setup, state: &State, left_out: &[bool]) -> Verdict 
     let bad = |key: &(usize, usize)| medians.get(key).is_some_and(|median| *median > IMAGE * sigma);
     let of_sample = |sample: usize| medians.range((sample, 0)..=(sample, usize::MAX)).map(|(key, _)| *key);
 
-    let moved = moved_cameras(setup, &medians, &bad);
-    let mut verdict = Verdict { active: vec![true; distances.len()], findings: Vec::new(), moved };
-    let mut wrong_joints = Vec::new();
-    let mut wrong_images = Vec::new();
+    let mut verdict = Verdict {
+        active: vec![true; distances.len()],
+        findings: Vec::new(),
+        moved: moved.to_vec(),
+        left_out: Vec::new(),
+    };
+    let mut wrong_joints = BTreeSet::new();
+    let mut wrong_images = BTreeSet::new();
     for sample in 0..setup.joints.len() {
         let images: Vec<(usize, usize)> = of_sample(sample).filter(|key| !verdict.moved[key.1]).collect();
         let wrong: Vec<(usize, usize)> = images.iter().copied().filter(|key| bad(key)).collect();
         if !wrong.is_empty() && wrong.len() == images.len() {
-            wrong_joints.push(sample);
+            wrong_joints.insert(sample);
         } else {
             wrong_images.extend(wrong);
         }
@@ -63,6 +82,7 @@ pub(crate) fn judge(setup: &Setup, state: &State, left_out: &[bool]) -> Verdict 
             || wrong_joints.contains(&seen.sample)
             || wrong_images.contains(&(seen.sample, seen.camera));
         let alone = *distance > DETECTION * sigma;
+        verdict.left_out.push(with_others);
         verdict.active[index] = !with_others && !alone;
         single += usize::from(!with_others && alone);
     }
@@ -83,35 +103,41 @@ pub(crate) fn distances(setup: &Setup, state: &State) -> Vec<f64> {
     setup.observations.iter().map(distance).collect()
 }
 
-fn moved_cameras(
-    setup: &Setup,
-    medians: &BTreeMap<(usize, usize), f64>,
-    bad: &impl Fn(&(usize, usize)) -> bool,
-) -> Vec<bool> {
-    let n_cameras = setup.rig.cameras.len();
-    let of_camera = |camera: usize| medians.keys().filter(move |key| key.1 == camera);
-    let share_of_bad = |camera: usize| {
-        // Only where another camera says that the sample's joints are right.
-        let others = |sample: usize| {
-            (0..n_cameras)
-                .any(|other| other != camera && medians.contains_key(&(sample, other)) && !bad(&(sample, other)))
-        };
-        let judged: Vec<_> = of_camera(camera).filter(|key| others(key.0)).collect();
-        let wrong = judged.iter().filter(|key| bad(key)).count();
-        (wrong >= 3).then(|| wrong as f64 / judged.len() as f64).unwrap_or(0.0)
+/// True where images are shifted as a whole by more than the noise of their detections explains: something moved that the
+/// model holds still.
+pub(crate) fn images_are_shifted(setup: &Setup, state: &State, left_out: &[bool]) -> bool {
+    let links: Vec<_> = setup.joints.iter().map(|joints| state.model.links(joints)).collect();
+    let mut images: BTreeMap<(usize, usize), (Vector2<f64>, f64, f64)> = BTreeMap::new();
+    for (seen, _) in setup.observations.iter().zip(left_out).filter(|(_, out)| !**out) {
+        let predicted = state.model.pixel(seen.camera, seen.feature, &links[seen.sample]);
+        let error = Vector2::from(predicted) - Vector2::from(seen.pixel);
+        let image = images.entry((seen.sample, seen.camera)).or_default();
+        *image = (image.0 + error, image.1 + error.norm_squared(), image.2 + 1.0);
+    }
+    // |mean|² against the scatter about it, in units of what independent noise gives: 1 on average for good data.
+    let ratio = |&(sum, squares, n): &(Vector2<f64>, f64, f64)| {
+        let shift = sum.norm_squared() / n;
+        let scatter = (squares - shift) / (n - 1.0);
+        (n >= 4.0).then(|| shift / scatter.max(1e-12))
     };
-    let shares: Vec<f64> = (0..n_cameras).map(share_of_bad).collect();
-    // At least one camera stays: the one that fits best.
-    let keep = (0..n_cameras).min_by(|&a, &b| shares[a].total_cmp(&shares[b])).unwrap_or(0);
-    (0..n_cameras).map(|camera| camera != keep && shares[camera] > MOVED).collect()
+    let mut ratios: Vec<f64> = images.values().filter_map(ratio).collect();
+    median(&mut ratios) > SHIFTED
+}
+
+/// Median distance over the observations of the cameras but one that are not left out [px].
+pub(crate) fn median_without(setup: &Setup, state: &State, left_out: &[bool], camera: usize) -> f64 {
+    let counted = setup.observations.iter().zip(distances(setup, state)).zip(left_out);
+    let mut others: Vec<f64> =
+        counted.filter(|((seen, _), out)| !**out && seen.camera != camera).map(|((_, d), _)| d).collect();
+    median(&mut others)
 }
 
 fn report(
     setup: &Setup,
     state: &State,
     medians: &BTreeMap<(usize, usize), f64>,
-    wrong_joints: &[usize],
-    wrong_images: &[(usize, usize)],
+    wrong_joints: &BTreeSet<usize>,
+    wrong_images: &BTreeSet<(usize, usize)>,
     sigma: f64,
     verdict: &mut Verdict,
 ) {

@@ -66,12 +66,6 @@ impl Priors {
                 Parameter::FeatureXyz(feature) => priors.features[feature] = [sd(LENGTH); 3],
             }
         }
-        // A joint without a beta has 0, known as well as its alpha where that is given.
-        for (index, joint) in rig.robot.joints.iter().enumerate().filter(|(_, joint)| joint.beta.is_none()) {
-            if joint.alpha.is_some() {
-                priors.parameters[row(index) + 4] = priors.parameters[row(index) + 3];
-            }
-        }
         priors
     }
 }

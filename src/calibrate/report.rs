@@ -58,6 +58,11 @@ pub struct StageReport {
 /// Something in the recording that does not fit the rest.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Finding {
+    /// A camera has no detection in a sample with joints and no given pose; the learned rig is without it.
+    UnseenCamera {
+        /// Its name.
+        camera: String,
+    },
     /// Single detections were left out.
     Outliers {
         /// How many.
@@ -97,6 +102,7 @@ pub enum Finding {
 impl std::fmt::Display for Finding {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
+            Finding::UnseenCamera { camera } => write!(f, "camera `{camera}` saw nothing and was left out"),
             Finding::Outliers { count, of } => write!(f, "{count} of {of} detections do not fit and were left out"),
             Finding::WrongJoints { sample, median_px, swapped_with } => {
                 write!(f, "sample {sample}: its joints do not lead to what the cameras saw ({median_px:.1} px)")?;

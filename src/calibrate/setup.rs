@@ -6,6 +6,7 @@ use crate::recording::{RecordedCamera, Recording};
 use crate::rig::{Camera, Feature, Joint, Model, ModelCamera, ModelFeature, Parent, Rig};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
+use std::collections::BTreeSet;
 
 /// A calibration problem before anything is estimated.
 #[derive(Clone, Debug)]
@@ -22,6 +23,8 @@ pub(crate) struct Setup {
     pub samples: Vec<usize>,
     /// Every detection of a sample that has joints, sample by sample.
     pub observations: Vec<Observation>,
+    /// Names of cameras that are left out: their poses are unknown, and no sample with joints has a detection of theirs.
+    pub unseen: Vec<String>,
 }
 
 /// One detection; indices are those of [`Setup`].
@@ -59,6 +62,7 @@ impl Setup {
             let recorded = recording.cameras.iter().find(|recorded| recorded.name == camera.name);
             intrinsics.push(complete_camera(camera, recorded, recording)?);
         }
+        let unseen = leave_out_unseen_cameras(&mut rig, &mut intrinsics, recording);
         for name in &recording.features {
             if !rig.features.iter().any(|feature| feature.name == *name) {
                 rig.features.push(Feature { name: name.clone(), parent: Parent::Tip, xyz: None });
@@ -67,12 +71,14 @@ impl Setup {
         check_held(&rig)?;
         let model = placeholder_model(&rig);
         let index = super::evaluate::Correspondence::new(&rig, recording);
-        let (mut joints, mut samples, mut observations) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut joints, mut samples, mut observations): (Vec<_>, Vec<_>, Vec<_>) =
+            (Vec::new(), Vec::new(), Vec::new());
         for (number, sample) in recording.samples.iter().enumerate() {
             let Some(readings) = &sample.joints else { continue };
             for detection in &sample.pixels {
-                let camera = index.cameras[detection.camera as usize].expect("every recorded camera is in the rig");
-                let feature = index.features[detection.feature as usize].expect("every recorded feature is in the rig");
+                let camera = index.cameras[detection.camera as usize];
+                let feature = index.features[detection.feature as usize];
+                let (Some(camera), Some(feature)) = (camera, feature) else { continue };
                 observations.push(Observation { sample: samples.len(), camera, feature, pixel: detection.pixel });
             }
             joints.push(readings.clone());
@@ -84,7 +90,7 @@ impl Setup {
         if observations.is_empty() {
             return Err(Error::NotEnoughData("no sample with joints has a detected feature".into()));
         }
-        Ok(Setup { rig, model, intrinsics, joints, samples, observations })
+        Ok(Setup { rig, model, intrinsics, joints, samples, observations, unseen })
     }
 
     /// True where every row of the chain is given.
@@ -167,6 +173,25 @@ fn complete_camera(
     camera.cx = Some(camera.cx.unwrap_or(0.5 * (width - 1.0)));
     camera.cy = Some(camera.cy.unwrap_or(0.5 * (height - 1.0)));
     Ok(known)
+}
+
+/// Takes out cameras that nothing could place, and returns their names.
+fn leave_out_unseen_cameras(
+    rig: &mut Rig,
+    intrinsics: &mut Vec<KnownIntrinsics>,
+    recording: &Recording,
+) -> Vec<String> {
+    let with_joints = recording.samples.iter().filter(|sample| sample.joints.is_some());
+    let seeing: BTreeSet<&str> = with_joints
+        .flat_map(|sample| &sample.pixels)
+        .map(|seen| recording.cameras[seen.camera as usize].name.as_str())
+        .collect();
+    let unseen = |camera: &Camera| camera.pose.is_none() && !seeing.contains(camera.name.as_str());
+    let names = rig.cameras.iter().filter(|camera| unseen(camera)).map(|camera| camera.name.clone()).collect();
+    let mut stays = rig.cameras.iter().map(|camera| !unseen(camera)).collect::<Vec<_>>().into_iter();
+    intrinsics.retain(|_| stays.next().unwrap_or(true));
+    rig.cameras.retain(|camera| !unseen(camera));
+    names
 }
 
 /// Size of the smallest image that holds all detections, where nobody gives one.

@@ -1,0 +1,99 @@
+//! The end-to-end fit among wrong data: fit with a loss that lets go of outliers, judge, leave out, and again.
+use super::graph::{Freedom, Priors, State};
+use super::outliers::{Verdict, images_are_shifted, judge, median_without};
+use super::setup::Setup;
+use super::stage::Stages;
+use crate::Error;
+use handeye_solvers::Loss;
+
+/// Widths of Cauchy's loss [standard deviations]: the first time, and whenever something was left out.
+const WIDTHS: [f64; 2] = [20.0, 3.0];
+
+/// Rounds of fitting and judging at most.
+const ROUNDS: usize = 8;
+
+/// A camera moved where the others fit better without it by this factor in the median.
+const SPOILS: f64 = 0.75;
+
+/// Fits robustly until the verdict on images, samples and cameras no longer changes.
+pub(crate) fn fit(
+    setup: &Setup,
+    state: &mut State,
+    freedom: &Freedom,
+    priors: &Priors,
+    stages: &mut Stages<'_>,
+    verdict: &mut Verdict,
+) -> Result<(), Error> {
+    let mut widths = &WIDTHS[..];
+    for _ in 0..ROUNDS {
+        for &width in widths {
+            let takes_part = |index: usize| !verdict.left_out[index];
+            stages.minimize("end to end, robust", setup, state, freedom, priors, Loss::Cauchy(width), takes_part)?;
+        }
+        widths = &WIDTHS[1..];
+        let before = std::mem::take(&mut verdict.left_out);
+        *verdict = judge(setup, state, &before, &verdict.moved);
+        if verdict.left_out != before {
+            continue;
+        }
+        if !images_are_shifted(setup, state, &verdict.left_out) {
+            break;
+        }
+        let spoiler = camera_that_spoils(setup, state, freedom, priors, stages, verdict)?;
+        let Some((camera, without)) = spoiler else { break };
+        *state = without;
+        verdict.moved[camera] = true;
+        *verdict = judge(setup, state, &before, &verdict.moved);
+    }
+    Ok(())
+}
+
+/// The camera without which the others fit clearly better, and the fit without it.
+fn camera_that_spoils(
+    setup: &Setup,
+    state: &State,
+    freedom: &Freedom,
+    priors: &Priors,
+    stages: &mut Stages<'_>,
+    verdict: &Verdict,
+) -> Result<Option<(usize, State)>, Error> {
+    let still: Vec<usize> = (0..verdict.moved.len()).filter(|&camera| !verdict.moved[camera]).collect();
+    let mut worst: Option<(f64, usize, State)> = None;
+    for &camera in still.iter().filter(|_| still.len() > 1) {
+        let mut without = state.clone();
+        let takes_part = |index: usize| !verdict.left_out[index] && setup.observations[index].camera != camera;
+        let loss = Loss::Cauchy(WIDTHS[1]);
+        stages.minimize("leaving out one camera", setup, &mut without, freedom, priors, loss, takes_part)?;
+        let ratio = median_without(setup, &without, &verdict.left_out, camera)
+            / median_without(setup, state, &verdict.left_out, camera);
+        if ratio < SPOILS && worst.as_ref().is_none_or(|worst| ratio < worst.0) {
+            worst = Some((ratio, camera, without));
+        }
+    }
+    Ok(worst.map(|(_, camera, state)| (camera, state)))
+}
+
+/// Puts cameras that moved where they were for most of the recording, with everything else held.
+pub(crate) fn place_moved(
+    setup: &Setup,
+    state: &mut State,
+    freedom: &Freedom,
+    priors: &Priors,
+    stages: &mut Stages<'_>,
+    verdict: &Verdict,
+) -> Result<(), Error> {
+    if !verdict.moved.contains(&true) {
+        return Ok(());
+    }
+    let mut only = freedom.clone();
+    only.base = [true; 6];
+    only.parameters.fill(true);
+    only.intrinsics.fill([true; 12]);
+    only.features.fill([true; 3]);
+    for (held, moved) in only.cameras.iter_mut().zip(&verdict.moved) {
+        *held = held.map(|held| held || !moved);
+    }
+    let takes_part = |index: usize| verdict.moved[setup.observations[index].camera];
+    stages.minimize("cameras that moved", setup, state, &only, priors, Loss::Cauchy(WIDTHS[1]), takes_part)?;
+    Ok(())
+}

@@ -1,0 +1,17 @@
+//! Real recordings and the peers' problems, where they are there: beside the project, or where HANDEYE_SHARED says.
+//!
+//! `cargo test --test recordings`; not part of the plain `cargo test`, which needs nothing but this project.
+mod ur3e;
+
+use std::path::PathBuf;
+
+/// The folder of the recordings, or `None` with a line that says so.
+fn shared(below: &str) -> Option<PathBuf> {
+    let folder = std::env::var_os("HANDEYE_SHARED").map_or_else(|| PathBuf::from("../shared"), PathBuf::from);
+    let path = folder.join(below);
+    if path.exists() {
+        return Some(path);
+    }
+    eprintln!("NOTHING TO RUN ON: {} is not there (set HANDEYE_SHARED to its folder)", path.display());
+    None
+}
