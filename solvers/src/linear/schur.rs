@@ -29,8 +29,8 @@ pub struct Schur {
     coupling: Vec<Coupling>,
     /// (first column in the system, first remaining column, columns) of every remaining node.
     remaining: Vec<(usize, usize, usize)>,
-    /// Blocks between remaining nodes with their spans.
-    rest: Vec<(Block, (usize, usize), (usize, usize))>,
+    /// Blocks between remaining nodes with the spans of their rows and columns.
+    rest: Vec<(Block, Span, Span)>,
     /// L_k by columns, and V by rows of k: (size k + i) of V is one row of `n` numbers.
     factors: Vec<f64>,
     v: Vec<f64>,
@@ -38,6 +38,9 @@ pub struct Schur {
     reduced: Factorization,
     reduced_y: Vec<f64>,
 }
+
+/// (first remaining column, columns)
+type Span = (usize, usize);
 
 struct Coupling {
     k: usize,

@@ -78,6 +78,7 @@ impl<T: Scalar> Mul for Pose<T> {
     type Output = Self;
 
     #[inline]
+    #[allow(clippy::suspicious_arithmetic_impl)] // R₁ t₂ + t₁
     fn mul(self, other: Self) -> Self {
         Pose {
             rotation: so3::times(&self.rotation, &other.rotation),
