@@ -1,5 +1,5 @@
 //! The factor graph: free, held and derived nodes, and the factors on them.
-use crate::pool::{FactorPool, FunctionPool, Pool, PriorPool};
+use crate::pool::{FactorPool, FunctionPool, Pool, PriorPool, squared};
 use crate::{Error, Factor, Function, Key, Loss, Noise, Variable, Variables};
 use std::any::TypeId;
 use std::collections::BTreeMap;
@@ -185,7 +185,7 @@ impl Graph {
         let place = factor.place as usize;
         let inputs: Vec<Vec<f64>> = pool.nodes(place).iter().map(|&node| self.stored(node)).collect();
         let x: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
-        pool.squared_norm(place, &x)
+        squared(&pool.residual(place, &x))
     }
 
     /// The node as it is stored, computed where it is derived.

@@ -2,6 +2,7 @@
 //!
 //! Knows no robot, no camera and no file: see the crate `handeye` for those.
 mod accumulate;
+pub mod check;
 mod error;
 mod factor;
 mod graph;
