@@ -335,8 +335,16 @@ impl Builder<'_> {
         let active: usize = nodes.iter().map(|&parent| usize::from(self.places[parent as usize].active)).sum();
         pattern.len += usize::from(self.places[node as usize].active) * active;
         plan.diagonal = self.offset(pattern, node, node);
-        let neighbours: Vec<u32> =
-            pattern.neighbours.get(&node).into_iter().flatten().copied().filter(|&other| other != node).collect();
+        // Derived nodes that were created later are substituted first, and no longer matter.
+        let remains = |&other: &u32| other < node || !self.places[other as usize].derived;
+        let neighbours: Vec<u32> = pattern
+            .neighbours
+            .get(&node)
+            .into_iter()
+            .flatten()
+            .copied()
+            .filter(|&o| o != node && remains(&o))
+            .collect();
         self.pairs(pattern, nodes, &mut plan.parents);
         for other in neighbours {
             let own = self.offset(pattern, node, other);

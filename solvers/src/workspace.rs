@@ -80,7 +80,10 @@ impl Workspace {
     fn pass(&mut self, graph: &Graph, values: &[f64], derivatives: bool, take: Take) -> f64 {
         let layout = &self.layout;
         let pass = Pass { graph, layout, values, derivatives, take };
-        self.shared.fill(0.0);
+        // A cost alone leaves H and b as they are: a rejected step solves with them again.
+        if derivatives {
+            self.shared.fill(0.0);
+        }
         if let [data] = &mut self.chunks[..] {
             pass.run(&layout.chunks[0], data, &mut self.shared);
             return data.cost;
@@ -88,11 +91,15 @@ impl Workspace {
         for (chunks, data) in layout.chunks.chunks(WAVE).zip(self.chunks.chunks_mut(WAVE)) {
             let copies = &mut self.wave[..chunks.len()];
             chunks.par_iter().zip(data).zip(&mut *copies).with_max_len(1).for_each(|((chunk, data), shared)| {
-                shared.fill(0.0);
+                if derivatives {
+                    shared.fill(0.0);
+                }
                 pass.run(chunk, data, shared);
             });
-            for copy in copies {
-                add_scaled(&mut self.shared, 1.0, copy);
+            if derivatives {
+                for copy in copies {
+                    add_scaled(&mut self.shared, 1.0, copy);
+                }
             }
         }
         self.chunks.iter().map(|data| data.cost).sum()
