@@ -5,6 +5,7 @@ mod accumulate;
 pub mod check;
 mod error;
 mod factor;
+mod gauss_newton;
 mod graph;
 mod jacobian;
 mod layout;
@@ -21,6 +22,7 @@ mod workspace;
 
 pub use error::Error;
 pub use factor::{Factor, Function};
+pub use gauss_newton::GaussNewton;
 pub use graph::{FactorKey, FactorSettings, Graph};
 pub use jacobian::Jacobian;
 pub use levenberg_marquardt::{LevenbergMarquardt, Solver};
