@@ -173,6 +173,11 @@ impl Solver {
         Solver { linear: choose(&workspace), workspace, buffers }
     }
 
+    /// How the linear systems are solved.
+    pub fn linear_solver(&self) -> &'static str {
+        self.linear.name()
+    }
+
     /// Starts over where the graph's structure has changed.
     pub(crate) fn fit(&mut self, graph: &Graph) {
         if !self.workspace.fits(graph) {

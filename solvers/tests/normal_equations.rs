@@ -224,6 +224,20 @@ fn dense_schur_and_sparse_solvers_take_the_same_step() {
 }
 
 #[test]
+fn samples_are_eliminated_where_what_they_share_has_the_same_size() {
+    let mut graph = Graph::new();
+    let cameras = [graph.free(Pose::identity()), graph.free(Pose::identity())];
+    let points = [0.0, 1.0, 2.0].map(|x| graph.free(Vector::<3>::new(x, 1.0, 2.0)));
+    for _ in 0..100 {
+        let tip = graph.free(Pose::identity());
+        for camera in cameras {
+            points.map(|point| drop(graph.factor(Sees(0.1), (tip, camera, point))));
+        }
+    }
+    assert_eq!(Solver::new(&graph).linear_solver(), "batched Schur complement");
+}
+
+#[test]
 fn the_same_bytes_come_out_on_one_thread_and_on_two() {
     let run = |threads: usize| {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| {
