@@ -120,8 +120,13 @@ impl Layout {
 
     /// First column of a free node in the system.
     pub fn column(&self, node: u32) -> usize {
-        let place = self.free.binary_search_by_key(&node, |&(node, _)| node).expect("the node is in the system");
-        self.free[place].1
+        self.column_of(node).expect("the node is in the system")
+    }
+
+    /// The same, `None` where no factor says anything about the node.
+    pub fn column_of(&self, node: u32) -> Option<usize> {
+        let place = self.free.binary_search_by_key(&node, |&(node, _)| node).ok()?;
+        Some(self.free[place].1)
     }
 }
 

@@ -3,6 +3,8 @@
 //! Knows no robot, no camera and no file: see the crate `handeye` for those.
 mod accumulate;
 pub mod check;
+mod covariance;
+mod derivative;
 mod error;
 mod factor;
 mod gauss_newton;
@@ -21,6 +23,7 @@ pub mod scalar;
 mod variables;
 mod workspace;
 
+pub use covariance::Covariance;
 pub use error::Error;
 pub use factor::{Factor, Function};
 pub use gauss_newton::GaussNewton;
