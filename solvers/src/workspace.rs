@@ -4,6 +4,7 @@ use crate::graph::Graph;
 use crate::jacobian::{Jacobian, compact};
 use crate::layout::{Block, Chunk, FunctionPlan, Layout};
 use crate::pool::{MOST, grown};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
 
 /// Chunks that are worked on side by side, each with a copy of the shared arena of its own. Fixed, so that the order of
@@ -37,6 +38,8 @@ pub(crate) enum Take {
     All,
     /// All but the priors.
     Data,
+    /// The priors alone.
+    Priors,
 }
 
 impl Workspace {
@@ -109,6 +112,31 @@ impl Workspace {
     pub(crate) fn block(&self, block: &Block) -> &[f64] {
         let active = |node: u32| usize::from(self.layout.places[node as usize].active);
         self.arena(block.chunk, block.offset, active(block.row) * active(block.column))
+    }
+
+    /// The diagonal block of the free node whose first column this is.
+    pub(crate) fn diagonal_block(&self, column: usize) -> DMatrix<f64> {
+        let layout = &self.layout;
+        let place = layout.free.binary_search_by_key(&column, |&(_, first)| first).expect("a node begins here");
+        let node = layout.free[place].0;
+        let block = layout.blocks.binary_search_by_key(&(node, node), |block| (block.column, block.row));
+        let n = usize::from(layout.places[node as usize].active);
+        DMatrix::from_column_slice(n, n, self.block(&layout.blocks[block.expect("a free node has a block")]))
+    }
+
+    /// H x.
+    pub(crate) fn multiply(&self, x: &DVector<f64>) -> DVector<f64> {
+        let mut y = DVector::zeros(x.len());
+        for block in &self.layout.blocks {
+            let span = |node: u32| (self.layout.column(node), usize::from(self.layout.places[node as usize].active));
+            let ((row, rows), (column, columns)) = (span(block.row), span(block.column));
+            let matrix = DMatrixView::from_slice(self.block(block), rows, columns);
+            y.rows_mut(row, rows).gemv(1.0, &matrix, &x.rows(column, columns), 1.0);
+            if block.row != block.column {
+                y.rows_mut(column, columns).gemv_tr(1.0, &matrix, &x.rows(row, rows), 1.0);
+            }
+        }
+        y
     }
 
     fn arena(&self, chunk: u32, offset: Offset, len: usize) -> &[f64] {
@@ -207,8 +235,13 @@ impl Pass<'_> {
         };
         for (pool, range) in &chunk.runs {
             let pool = &self.graph.factors[*pool as usize];
-            if self.take == Take::Data && pool.is_prior() {
-                range.clone().for_each(|_| run.skip(1));
+            let taken = match self.take {
+                Take::All => true,
+                Take::Data => !pool.is_prior(),
+                Take::Priors => pool.is_prior(),
+            };
+            if !taken {
+                range.clone().for_each(|place| run.skip(pool.nodes(place).len()));
             } else {
                 pool.run(range.clone(), &mut run);
             }
