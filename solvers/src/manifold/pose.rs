@@ -123,7 +123,7 @@ impl Variable for Pose {
         }
     }
 
-    /// (I + [w]) R, which has the derivative of exp(w) R at w = 0 for a third of the work.
+    /// (I + K) R with K v = w × v, which has the derivative of exp(w) R at w = 0 for a third of the work.
     #[inline]
     fn seed<T: Scalar>(x: &[f64], delta: impl Fn(usize) -> T) -> Pose<T> {
         let w = [delta(0), delta(1), delta(2)];
