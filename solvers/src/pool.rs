@@ -1,5 +1,5 @@
 //! Factors and functions of one type side by side, behind one call per run of them.
-use crate::accumulate::{Run, accumulate};
+use crate::accumulate::{Run, Want, accumulate};
 use crate::jacobian::{Jacobian, compact, forward};
 use crate::scalar::Dual;
 use crate::{Factor, Function, Loss, Noise, Variable, Variables};
@@ -82,7 +82,7 @@ impl<F: Factor<M>, const M: usize> FactorPool for Pool<F, M> {
             let nodes = placed.nodes.as_ref();
             let arguments = run.arguments(nodes);
             let (x, columns) = (&arguments.x[..nodes.len()], &arguments.columns[..nodes.len()]);
-            if !run.derivatives || arguments.active == 0 {
+            if run.want == Want::Cost || arguments.active == 0 {
                 let mut r = placed.factor.evaluate(x, None);
                 placed.noise.whiten(&mut r, None);
                 run.cost += 0.5 * placed.loss.evaluate(squared(&r), run.graduation).0;
@@ -193,7 +193,7 @@ impl<V: Variable<Over<f64> = V>> FactorPool for PriorPool<V> {
             let r = grown(&mut residual, rows);
             self.whitened(prior, arguments.x[0], r);
             run.cost += 0.5 * squared(r);
-            if !run.derivatives || arguments.active == 0 {
+            if run.want == Want::Cost || arguments.active == 0 {
                 run.skip(1);
                 continue;
             }
