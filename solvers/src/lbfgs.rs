@@ -2,12 +2,11 @@
 use crate::report::{Iteration, Observer, Report, Termination};
 use crate::tangent::Tangent;
 use crate::workspace::{Mask, Workspace};
-use crate::{Error, FactorKey, Graph};
+use crate::{Error, Graph, Minibatches};
 use argmin::core::{CostFunction, Gradient, IterState, Problem, Solver, State};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
 use rand::SeedableRng;
-use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use std::cell::RefCell;
 use std::ops::ControlFlow;
@@ -32,21 +31,6 @@ impl Default for Lbfgs {
     fn default() -> Self {
         Lbfgs { memory: 30, max_iterations: 2_000, cost_tolerance: 1e-12, gradient_tolerance: 1e-9 }
     }
-}
-
-/// Parts of the data that come first.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Minibatches {
-    /// Factors that belong together, such as those of one sample. Factors of no group are always taken.
-    pub groups: Vec<Vec<FactorKey>>,
-    /// Groups in a minibatch.
-    pub size: usize,
-    /// How many minibatches there are, and how many steps are taken on each.
-    pub batches: usize,
-    /// Steps on each minibatch.
-    pub iterations_each: usize,
-    /// Decides which groups are in which.
-    pub seed: u64,
 }
 
 /// Evaluations in one line search, at most.
@@ -115,21 +99,6 @@ impl Lbfgs {
         let iterations = phase.iterations;
         let final_cost = workspace.cost(graph, &graph.values);
         Ok(Report { iterations, initial_cost, final_cost, termination, linear_solver: "none" })
-    }
-}
-
-impl Minibatches {
-    fn draw(&self, graph: &Graph, random: &mut ChaCha8Rng) -> Mask {
-        let mut mask: Mask = graph.factors.iter().map(|_| Vec::new()).collect();
-        graph.order.iter().for_each(|key| mask[key.pool as usize].push(true));
-        let mut set = |group: usize, taken: bool| {
-            self.groups[group].iter().for_each(|key| mask[key.pool as usize][key.place as usize] = taken);
-        };
-        let mut groups: Vec<usize> = (0..self.groups.len()).collect();
-        groups.shuffle(random);
-        groups.iter().for_each(|&group| set(group, false));
-        groups.iter().take(self.size).for_each(|&group| set(group, true));
-        mask
     }
 }
 

@@ -3,6 +3,7 @@
 //! Knows no robot, no camera and no file: see the crate `handeye` for those.
 mod accumulate;
 pub mod check;
+mod chunks;
 mod covariance;
 mod derivative;
 mod eigen;
@@ -18,6 +19,7 @@ mod levenberg_marquardt;
 pub mod linear;
 mod loss;
 pub mod manifold;
+mod minibatches;
 mod noise;
 mod pool;
 mod report;
@@ -35,10 +37,11 @@ pub use gauss_newton::GaussNewton;
 pub use graduated::Graduated;
 pub use graph::{FactorKey, FactorSettings, Graph};
 pub use jacobian::Jacobian;
-pub use lbfgs::{Lbfgs, Minibatches};
+pub use lbfgs::Lbfgs;
 pub use levenberg_marquardt::{LevenbergMarquardt, Solver};
 pub use loss::Loss;
 pub use manifold::{Direction, DynamicVector, Pose, Rotation, Variable, Vector};
+pub use minibatches::Minibatches;
 pub use nalgebra;
 pub use noise::Noise;
 pub use report::{Iteration, Observer, Report, Termination};

@@ -1,5 +1,6 @@
 //! Linear solvers for the normal equations, behind one trait and chosen from their structure.
 mod dense;
+mod independent;
 mod schur;
 mod sparse;
 

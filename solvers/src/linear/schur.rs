@@ -3,19 +3,18 @@
 //! With H = [E W; Wᵀ S] and E block-diagonal, blocks L Lᵀ = E_k and V_k = L⁻¹ W_k give the reduced system
 //! (S - Σ V_kᵀ V_k) x = y_s - Σ V_kᵀ L⁻¹ y_k, after which x_k = L⁻ᵀ (L⁻¹ y_k - V_k x).
 use super::dense::Factorization;
+use super::independent::independent;
 use super::{LinearSolver, scatter_lower};
 use crate::Workspace;
-use crate::layout::{Block, Layout};
+use crate::layout::Block;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, MatMut, MatRef, Par};
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Rows of V that one matrix product takes.
 const BATCH: usize = 512;
 
-/// The largest block that is eliminated, and the largest number of columns that may remain.
-const LARGEST: usize = 16;
+/// The largest number of columns that may remain.
 const REMAINING: usize = 600;
 
 /// Eliminates the free nodes of one size that no factor ties to each other.
@@ -241,32 +240,6 @@ impl Schur {
             own[i] = (own[i] - shared - known) / l[i * (m + 1)];
         }
     }
-}
-
-/// Nodes of one size that no block ties to each other, as (size, nodes in ascending order), for the size where they have
-/// most columns. Nodes with few neighbours are taken first: samples before the cameras that all of them share.
-fn independent(layout: &Layout) -> Option<(usize, Vec<u32>)> {
-    let active = |node: u32| usize::from(layout.places[node as usize].active);
-    let mut neighbours: Vec<Vec<u32>> = vec![Vec::new(); layout.places.len()];
-    for block in layout.blocks.iter().filter(|block| block.row != block.column) {
-        neighbours[block.row as usize].push(block.column);
-        neighbours[block.column as usize].push(block.row);
-    }
-    let mut nodes: Vec<u32> =
-        layout.free.iter().map(|&(node, _)| node).filter(|&node| active(node) <= LARGEST).collect();
-    nodes.sort_by_key(|&node| (neighbours[node as usize].len(), node));
-    let mut taken = vec![false; layout.places.len()];
-    let mut sizes: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
-    for node in nodes {
-        let size = active(node);
-        if !neighbours[node as usize].iter().any(|&other| taken[other as usize] && active(other) == size) {
-            taken[node as usize] = true;
-            sizes.entry(size).or_default().push(node);
-        }
-    }
-    let (size, mut chosen) = sizes.into_iter().max_by_key(|(size, nodes)| size * nodes.len())?;
-    chosen.sort_unstable();
-    Some((size, chosen))
 }
 
 /// Cholesky factor of a small matrix in its lower triangle, stored by columns.
