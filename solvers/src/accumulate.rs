@@ -43,6 +43,16 @@ pub(crate) struct Place {
     pub gradient: Offset,
 }
 
+/// What a pass computes.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Debug)]
+pub(crate) enum Want {
+    Cost,
+    /// The cost and b.
+    Gradient,
+    /// The cost, b and H.
+    Equations,
+}
+
 /// Buffers that a pass borrows, so that it allocates nothing once they have grown.
 #[derive(Default)]
 pub(crate) struct Scratch {
@@ -62,7 +72,7 @@ pub(crate) struct Run<'a> {
     pub shared: &'a mut [f64],
     /// Blocks of the coming factors: of each, one per pair of arguments (a, b) with a <= b.
     pub offsets: &'a [Offset],
-    pub derivatives: bool,
+    pub want: Want,
     pub graduation: f64,
     pub cost: f64,
     pub scratch: &'a mut Scratch,
@@ -114,7 +124,7 @@ impl<'a> Run<'a> {
     /// Passes over the blocks of a factor that adds none.
     #[inline]
     pub fn skip(&mut self, arguments: usize) {
-        if self.derivatives {
+        if self.want > Want::Cost {
             self.offsets = &self.offsets[arguments * (arguments + 1) / 2..];
         }
     }
@@ -134,6 +144,7 @@ pub(crate) fn accumulate(run: &mut Run<'_>, ids: &[u32], starts: &[usize], r: &[
     let width = jacobian.len() / r.len();
     let places = run.places;
     let dim = |k: usize| usize::from(places[ids[k] as usize].active);
+    let gradient_only = run.want == Want::Gradient;
     let mut pair = 0;
     for a in 0..ids.len() {
         let (ca, da) = (starts[a], dim(a));
@@ -142,6 +153,10 @@ pub(crate) fn accumulate(run: &mut Run<'_>, ids: &[u32], starts: &[usize], r: &[
             for (m, &r) in r.iter().enumerate() {
                 add_scaled(b, r, &jacobian[m * width + ca..m * width + ca + da]);
             }
+        }
+        if gradient_only {
+            pair += ids.len() - a;
+            continue;
         }
         for b in a..ids.len() {
             let (cb, db) = (starts[b], dim(b));

@@ -3,6 +3,9 @@ use crate::jacobian::{Jacobian, forward};
 use crate::scalar::Dual;
 use crate::{Scalar, Variable, Variables};
 
+/// Steps of derived nodes up to this length are kept on the stack.
+const SHORT: usize = 12;
+
 /// A residual r(x) in R^M on a tuple of variables.
 ///
 /// Only `residual` is needed: it is written once over the scalar, and its Jacobian follows by forward mode.
@@ -64,8 +67,15 @@ pub trait Function: Send + Sync + 'static {
         let value = self.compute(<Self::On as Variables>::seed(x, |_, _| 0.0));
         Self::Output::store(&value, y);
         if let Some(jacobian) = jacobian {
-            let mut step = vec![Dual::from(0.0); value.tangent()];
-            forward::<Self::On>(x, jacobian, &mut step, |on, step| Self::Output::local(y, &self.compute(on), step));
+            let tangent = value.tangent();
+            let (mut short, mut long) = ([Dual::from(0.0); SHORT], Vec::new());
+            let step = if tangent <= SHORT {
+                &mut short[..tangent]
+            } else {
+                long.resize(tangent, Dual::from(0.0));
+                &mut long[..]
+            };
+            forward::<Self::On>(x, jacobian, step, |on, step| Self::Output::local(y, &self.compute(on), step));
         }
     }
 }

@@ -1,5 +1,7 @@
 //! The factor graph: free, held and derived nodes, and the factors on them.
-use crate::pool::{FactorPool, FunctionPool, Pool, PriorPool};
+use crate::accumulate::add_scaled;
+use crate::pool::{FactorPool, FunctionPool, Pool, PriorPool, squared};
+use crate::scalar::{Dual, LANES, derivatives, seed};
 use crate::{Error, Factor, Function, Key, Loss, Noise, Variable, Variables};
 use std::any::TypeId;
 use std::collections::BTreeMap;
@@ -36,7 +38,11 @@ pub(crate) struct Node {
     /// Free coordinates, ascending, where not all of them are.
     pub free: Option<Vec<u16>>,
     pub retract: fn(&[f64], &[f64], &mut [f64]),
+    pub transport: Transport,
 }
+
+/// See [`transport`].
+type Transport = fn(&[f64], &[f64], &[f64], &mut [f64]);
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Role {
@@ -91,7 +97,8 @@ impl Graph {
         self.revision += 1;
         let key = Key::new(self.nodes.len());
         let (start, ambient) = (self.values.len(), value.ambient());
-        self.nodes.push(Node { role, start, ambient, tangent: value.tangent(), free: None, retract: retract::<V> });
+        let (tangent, retract, transport) = (value.tangent(), retract::<V> as _, transport::<V> as _);
+        self.nodes.push(Node { role, start, ambient, tangent, free: None, retract, transport });
         if !matches!(role, Role::Derived(_)) {
             self.values.resize(start + ambient, 0.0);
             V::store(&value, &mut self.values[start..]);
@@ -185,7 +192,7 @@ impl Graph {
         let place = factor.place as usize;
         let inputs: Vec<Vec<f64>> = pool.nodes(place).iter().map(|&node| self.stored(node)).collect();
         let x: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
-        pool.squared_norm(place, &x)
+        squared(&pool.residual(place, &x))
     }
 
     /// The node as it is stored, computed where it is derived.
@@ -220,6 +227,23 @@ impl Graph {
 
 fn retract<V: Variable>(x: &[f64], delta: &[f64], y: &mut [f64]) {
     V::store(&V::retract::<f64>(x, |i| delta[i]), y);
+}
+
+/// Turns a gradient over steps from x = x0 ⊞ δ into one over δ: Tᵀ g with T = ∂((x0 ⊞ (δ + ε)) ⊟ x)/∂ε at ε = 0.
+fn transport<V: Variable<Over<f64> = V>>(x0: &[f64], delta: &[f64], x: &[f64], gradient: &mut [f64]) {
+    let n = gradient.len();
+    let (mut result, mut step) = (vec![0.0; n], vec![Dual::from(0.0); n]);
+    for first in (0..n).step_by(LANES) {
+        let moved = V::retract::<Dual>(x0, |i| match i.checked_sub(first) {
+            Some(lane) if lane < LANES => seed(delta[i], lane),
+            _ => Dual::from(delta[i]),
+        });
+        V::local(x, &moved, &mut step);
+        for (step, g) in step.iter().zip(&*gradient) {
+            add_scaled(&mut result[first..], *g, &derivatives(step));
+        }
+    }
+    gradient.copy_from_slice(&result);
 }
 
 /// The noise and the loss of a factor that was just added.

@@ -6,12 +6,10 @@
 //! fills its own copy, summed in a fixed order. The chunks depend on the graph alone, so the sum does too, on any number of
 //! threads.
 use crate::accumulate::{Offset, Place};
+use crate::chunks::{Owner, chunks, owners, parents};
 use crate::graph::{Graph, Role};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-
-/// Factors in a chunk, at least: about half a millisecond of work.
-const CHUNK: usize = 1024;
 
 pub(crate) struct Layout {
     pub places: Vec<Place>,
@@ -120,8 +118,13 @@ impl Layout {
 
     /// First column of a free node in the system.
     pub fn column(&self, node: u32) -> usize {
-        let place = self.free.binary_search_by_key(&node, |&(node, _)| node).expect("the node is in the system");
-        self.free[place].1
+        self.column_of(node).expect("the node is in the system")
+    }
+
+    /// The same, `None` where no factor says anything about the node.
+    pub fn column_of(&self, node: u32) -> Option<usize> {
+        let place = self.free.binary_search_by_key(&node, |&(node, _)| node).ok()?;
+        Some(self.free[place].1)
     }
 }
 
@@ -147,109 +150,6 @@ fn places(graph: &Graph) -> Vec<Place> {
         });
     }
     places
-}
-
-fn parents(graph: &Graph, derived: u32) -> &[u32] {
-    let derived = &graph.derived[derived as usize];
-    graph.functions[derived.pool as usize].nodes(derived.place as usize)
-}
-
-/// The chunk of every factor and of every derived node that a factor needs, and how many chunks there are.
-fn chunks(graph: &Graph) -> (Vec<usize>, Vec<Option<usize>>, usize) {
-    // Derived nodes that a factor or another derived node joins are in one group, named by its smallest member.
-    let mut group: Vec<usize> = (0..graph.derived.len()).collect();
-    let derived_of = |node: u32| match graph.nodes[node as usize].role {
-        Role::Derived(derived) => Some(derived as usize),
-        _ => None,
-    };
-    for (derived, entry) in graph.derived.iter().enumerate() {
-        for &parent in graph.functions[entry.pool as usize].nodes(entry.place as usize) {
-            if let Some(parent) = derived_of(parent) {
-                join(&mut group, derived, parent);
-            }
-        }
-    }
-    let touched = |factor: usize| {
-        let key = graph.order[factor];
-        graph.factors[key.pool as usize].nodes(key.place as usize).iter().filter_map(move |&node| derived_of(node))
-    };
-    for factor in 0..graph.order.len() {
-        let mut derived = touched(factor);
-        if let Some(first) = derived.next() {
-            derived.for_each(|other| join(&mut group, first, other));
-        }
-    }
-    let mut chunk_of_group: Vec<Option<usize>> = vec![None; graph.derived.len()];
-    let (mut chunk, mut filled) = (0, 0);
-    let mut chunk_of_factor = Vec::with_capacity(graph.order.len());
-    for factor in 0..graph.order.len() {
-        let root = touched(factor).next().map(|derived| root(&mut group, derived));
-        let own = match root.and_then(|root| chunk_of_group[root]) {
-            Some(chunk) => chunk,
-            None => {
-                if filled >= CHUNK {
-                    chunk += 1;
-                    filled = 0;
-                }
-                if let Some(root) = root {
-                    chunk_of_group[root] = Some(chunk);
-                }
-                chunk
-            }
-        };
-        filled += usize::from(own == chunk);
-        chunk_of_factor.push(own);
-    }
-    let chunk_of_derived = (0..graph.derived.len()).map(|derived| chunk_of_group[root(&mut group, derived)]).collect();
-    (chunk_of_factor, chunk_of_derived, chunk + 1)
-}
-
-fn root(group: &mut [usize], mut member: usize) -> usize {
-    while group[member] != member {
-        group[member] = group[group[member]];
-        member = group[member];
-    }
-    member
-}
-
-fn join(group: &mut [usize], a: usize, b: usize) {
-    let (a, b) = (root(group, a), root(group, b));
-    group[a.max(b)] = a.min(b);
-}
-
-/// Which chunks touch a node.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Owner {
-    Nobody,
-    Chunk(usize),
-    Shared,
-}
-
-fn owners(graph: &Graph, places: &[Place], factors: &[usize], derived: &[Option<usize>]) -> Vec<Owner> {
-    let mut owner = vec![Owner::Nobody; graph.nodes.len()];
-    let mut touch = |node: u32, chunk: usize| {
-        let owner = &mut owner[node as usize];
-        *owner = match *owner {
-            Owner::Nobody => Owner::Chunk(chunk),
-            Owner::Chunk(other) if other == chunk => Owner::Chunk(chunk),
-            _ => Owner::Shared,
-        };
-    };
-    for (key, &chunk) in graph.order.iter().zip(factors) {
-        for &node in graph.factors[key.pool as usize].nodes(key.place as usize) {
-            touch(node, chunk);
-        }
-    }
-    for (entry, &chunk) in graph.derived.iter().zip(derived) {
-        let Some(chunk) = chunk else { continue };
-        touch(entry.node, chunk);
-        if places[entry.node as usize].active > 0 {
-            for &parent in graph.functions[entry.pool as usize].nodes(entry.place as usize) {
-                touch(parent, chunk);
-            }
-        }
-    }
-    owner
 }
 
 struct Builder<'a> {
@@ -288,7 +188,7 @@ impl Builder<'_> {
         }
         for &derived in derived {
             touch(graph.derived[derived].node);
-            self::parents(graph, derived as u32).iter().for_each(|&node| touch(node));
+            parents(graph, derived as u32).iter().for_each(|&node| touch(node));
         }
         for node in chunk_nodes {
             let place = &mut self.places[node as usize];
@@ -335,8 +235,16 @@ impl Builder<'_> {
         let active: usize = nodes.iter().map(|&parent| usize::from(self.places[parent as usize].active)).sum();
         pattern.len += usize::from(self.places[node as usize].active) * active;
         plan.diagonal = self.offset(pattern, node, node);
-        let neighbours: Vec<u32> =
-            pattern.neighbours.get(&node).into_iter().flatten().copied().filter(|&other| other != node).collect();
+        // Derived nodes that were created later are substituted first, and no longer matter.
+        let remains = |&other: &u32| other < node || !self.places[other as usize].derived;
+        let neighbours: Vec<u32> = pattern
+            .neighbours
+            .get(&node)
+            .into_iter()
+            .flatten()
+            .copied()
+            .filter(|&o| o != node && remains(&o))
+            .collect();
         self.pairs(pattern, nodes, &mut plan.parents);
         for other in neighbours {
             let own = self.offset(pattern, node, other);

@@ -21,6 +21,9 @@ pub struct LevenbergMarquardt {
     pub step_tolerance: f64,
     /// Stops where the largest entry of b, each divided by the root of its diagonal entry of H, is below this.
     pub gradient_tolerance: f64,
+    /// In the damping, no diagonal entry of H counts for less than this share of the largest that it has been, so that a
+    /// number that all residuals lose sight of for a while is not thrown far. 0 is Marquardt's scaling, 1 that of Moré 1978.
+    pub scale_memory: f64,
 }
 
 impl Default for LevenbergMarquardt {
@@ -31,11 +34,12 @@ impl Default for LevenbergMarquardt {
             cost_tolerance: 1e-10,
             step_tolerance: 1e-14,
             gradient_tolerance: 1e-12,
+            scale_memory: 1e-6,
         }
     }
 }
 
-/// Diagonal entries of H below this share of the largest are damped as if they had it.
+/// Diagonal entries of H below this share of the largest of all are damped as if they had it.
 const SMALLEST_DIAGONAL: f64 = 1e-16;
 
 /// λ beyond which a step no longer moves anything.
@@ -56,7 +60,7 @@ impl LevenbergMarquardt {
     ) -> Result<Report, Error> {
         solver.fit(graph);
         let Solver { workspace, linear, buffers } = solver;
-        let Buffers { b, step, damping, diagonal, trial } = buffers;
+        let Buffers { b, step, damping, diagonal, largest_diagonal, trial } = buffers;
         if b.is_empty() {
             return Err(Error::NothingFree);
         }
@@ -67,6 +71,7 @@ impl LevenbergMarquardt {
         let initial_cost = cost;
         workspace.gradient(b);
         workspace.diagonal(diagonal);
+        largest_diagonal.copy_from_slice(diagonal);
         let (mut lambda, mut nu) = (self.initial_damping, 2.0);
         let mut iterations = 0;
         let termination = loop {
@@ -79,15 +84,18 @@ impl LevenbergMarquardt {
                 break Termination::IterationLimit;
             }
             iterations += 1;
-            for (damping, d) in damping.iter_mut().zip(&*diagonal) {
-                *damping = lambda * d.max(floor);
+            for ((damping, d), most) in damping.iter_mut().zip(&*diagonal).zip(&mut *largest_diagonal) {
+                *most = most.max(*d);
+                *damping = lambda * d.max(floor).max(self.scale_memory * *most);
+            }
+            for (step, b) in step.iter_mut().zip(&*b) {
+                *step = -b;
             }
             let solved = linear.factorize(workspace, damping);
             if solved {
-                for (step, b) in step.iter_mut().zip(&*b) {
-                    *step = -b;
-                }
                 linear.solve(step);
+            }
+            if solved && step.iter().all(|s| s.is_finite()) {
                 let largest = workspace.retract(graph, step, trial);
                 if largest <= self.step_tolerance {
                     break Termination::StepTolerance;
@@ -138,6 +146,7 @@ pub(crate) struct Buffers {
     pub step: Vec<f64>,
     pub damping: Vec<f64>,
     pub diagonal: Vec<f64>,
+    pub largest_diagonal: Vec<f64>,
     /// Values of all nodes after the step that is being tried.
     pub trial: Vec<f64>,
 }
@@ -153,9 +162,20 @@ impl Solver {
         let workspace = Workspace::new(graph);
         let n = workspace.layout.columns;
         let zeros = || vec![0.0; n];
-        let buffers =
-            Buffers { b: zeros(), step: zeros(), damping: zeros(), diagonal: zeros(), trial: graph.values.clone() };
+        let buffers = Buffers {
+            b: zeros(),
+            step: zeros(),
+            damping: zeros(),
+            diagonal: zeros(),
+            largest_diagonal: zeros(),
+            trial: graph.values.clone(),
+        };
         Solver { linear: choose(&workspace), workspace, buffers }
+    }
+
+    /// How the linear systems are solved.
+    pub fn linear_solver(&self) -> &'static str {
+        self.linear.name()
     }
 
     /// Starts over where the graph's structure has changed.

@@ -1,5 +1,5 @@
 //! Factors and functions of one type side by side, behind one call per run of them.
-use crate::accumulate::{Run, accumulate};
+use crate::accumulate::{Run, Want, accumulate};
 use crate::jacobian::{Jacobian, compact, forward};
 use crate::scalar::Dual;
 use crate::{Factor, Function, Loss, Noise, Variable, Variables};
@@ -13,7 +13,9 @@ pub(crate) const MOST: usize = 8;
 /// All factors of one type.
 pub(crate) trait FactorPool: Any + Send + Sync {
     fn nodes(&self, place: usize) -> &[u32];
-    fn squared_norm(&self, place: usize, x: &[&[f64]]) -> f64;
+    /// The whitened residual r/σ.
+    fn residual(&self, place: usize, x: &[&[f64]]) -> Vec<f64>;
+    fn loss(&self, place: usize) -> Loss;
     /// True for Gaussian priors, which are not data.
     fn is_prior(&self) -> bool;
     /// Adds the cost of a range of factors and, if wanted, their normal equations.
@@ -59,11 +61,15 @@ impl<F: Factor<M>, const M: usize> FactorPool for Pool<F, M> {
         self.placed[place].nodes.as_ref()
     }
 
-    fn squared_norm(&self, place: usize, x: &[&[f64]]) -> f64 {
+    fn residual(&self, place: usize, x: &[&[f64]]) -> Vec<f64> {
         let placed = &self.placed[place];
         let mut r = placed.factor.evaluate(x, None);
         placed.noise.whiten(&mut r, None);
-        r.iter().map(|x| x * x).sum()
+        r.to_vec()
+    }
+
+    fn loss(&self, place: usize) -> Loss {
+        self.placed[place].loss
     }
 
     fn is_prior(&self) -> bool {
@@ -76,7 +82,7 @@ impl<F: Factor<M>, const M: usize> FactorPool for Pool<F, M> {
             let nodes = placed.nodes.as_ref();
             let arguments = run.arguments(nodes);
             let (x, columns) = (&arguments.x[..nodes.len()], &arguments.columns[..nodes.len()]);
-            if !run.derivatives || arguments.active == 0 {
+            if run.want == Want::Cost || arguments.active == 0 {
                 let mut r = placed.factor.evaluate(x, None);
                 placed.noise.whiten(&mut r, None);
                 run.cost += 0.5 * placed.loss.evaluate(squared(&r), run.graduation).0;
@@ -116,7 +122,7 @@ pub(crate) fn grown(buffer: &mut Vec<f64>, len: usize) -> &mut [f64] {
 }
 
 #[inline]
-fn squared(r: &[f64]) -> f64 {
+pub(crate) fn squared(r: &[f64]) -> f64 {
     r.iter().map(|x| x * x).sum()
 }
 
@@ -149,7 +155,7 @@ impl<V: Variable<Over<f64> = V>> PriorPool<V> {
         self.placed.len() as u32 - 1
     }
 
-    fn residual(&self, prior: &PlacedPrior, x: &[f64], r: &mut [f64]) {
+    fn whitened(&self, prior: &PlacedPrior, x: &[f64], r: &mut [f64]) {
         V::local::<f64>(&prior.mean, &V::load(x), r);
         for (r, w) in r.iter_mut().zip(&prior.weights) {
             *r *= w;
@@ -162,11 +168,15 @@ impl<V: Variable<Over<f64> = V>> FactorPool for PriorPool<V> {
         &self.placed[place].node
     }
 
-    fn squared_norm(&self, place: usize, x: &[&[f64]]) -> f64 {
+    fn residual(&self, place: usize, x: &[&[f64]]) -> Vec<f64> {
         let prior = &self.placed[place];
         let mut r = vec![0.0; prior.weights.len()];
-        self.residual(prior, x[0], &mut r);
-        squared(&r)
+        self.whitened(prior, x[0], &mut r);
+        r
+    }
+
+    fn loss(&self, _place: usize) -> Loss {
+        Loss::Squared
     }
 
     fn is_prior(&self) -> bool {
@@ -181,9 +191,9 @@ impl<V: Variable<Over<f64> = V>> FactorPool for PriorPool<V> {
             let arguments = run.arguments(&prior.node);
             let rows = prior.weights.len();
             let r = grown(&mut residual, rows);
-            self.residual(prior, arguments.x[0], r);
+            self.whitened(prior, arguments.x[0], r);
             run.cost += 0.5 * squared(r);
-            if !run.derivatives || arguments.active == 0 {
+            if run.want == Want::Cost || arguments.active == 0 {
                 run.skip(1);
                 continue;
             }

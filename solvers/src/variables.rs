@@ -71,11 +71,17 @@ pub trait Variables: 'static {
     /// The tuple with each variable moved to first order: `x[k]` is how the k-th is stored, `delta(k, i)` the i-th number
     /// of its step.
     fn seed<T: Scalar>(x: &[&[f64]], delta: impl Fn(usize, usize) -> T) -> Self::Over<T>;
+
+    /// Each variable as it is stored, and how many numbers its step has.
+    fn stored(&self) -> Vec<(Vec<f64>, usize)>;
+
+    /// Moves the k-th variable, from and to how it is stored.
+    fn retract(k: usize, x: &[f64], delta: &[f64], y: &mut [f64]);
 }
 
 macro_rules! variables {
     ($($variable:ident $key:ident $k:tt),+) => {
-        impl<$($variable: Variable),+> Variables for ($($variable,)+) {
+        impl<$($variable: Variable<Over<f64> = $variable>),+> Variables for ($($variable,)+) {
             type Keys = ($(Key<$variable>,)+);
             type Nodes = [u32; [$($k),+].len()];
             type Over<T: Scalar> = ($($variable::Over<T>,)+);
@@ -87,6 +93,21 @@ macro_rules! variables {
             #[inline]
             fn seed<T: Scalar>(x: &[&[f64]], delta: impl Fn(usize, usize) -> T) -> Self::Over<T> {
                 ($($variable::seed(x[$k], |i| delta($k, i)),)+)
+            }
+
+            fn stored(&self) -> Vec<(Vec<f64>, usize)> {
+                vec![$({
+                    let mut x = vec![0.0; self.$k.ambient()];
+                    $variable::store(&self.$k, &mut x);
+                    (x, self.$k.tangent())
+                }),+]
+            }
+
+            fn retract(k: usize, x: &[f64], delta: &[f64], y: &mut [f64]) {
+                match k {
+                    $($k => $variable::store(&$variable::retract::<f64>(x, |i| delta[i]), y),)+
+                    _ => unreachable!("a tuple has no such variable"),
+                }
             }
         }
     };

@@ -1,9 +1,11 @@
 //! Evaluates a graph: costs, and normal equations with the derived nodes substituted.
-use crate::accumulate::{Offset, Run, Scratch, add_scaled, arguments};
+use crate::accumulate::{Offset, Run, Scratch, Want, add_scaled, arguments};
 use crate::graph::Graph;
 use crate::jacobian::{Jacobian, compact};
 use crate::layout::{Block, Chunk, FunctionPlan, Layout};
 use crate::pool::{MOST, grown};
+use crate::substitute::substitute;
+use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
 
 /// Chunks that are worked on side by side, each with a copy of the shared arena of its own. Fixed, so that the order of
@@ -37,7 +39,12 @@ pub(crate) enum Take {
     All,
     /// All but the priors.
     Data,
+    /// The priors alone.
+    Priors,
 }
+
+/// By pool and place: whether a factor is taken.
+pub(crate) type Mask = Vec<Vec<bool>>;
 
 impl Workspace {
     /// Lays out the normal equations of a graph.
@@ -69,18 +76,27 @@ impl Workspace {
 
     /// Sum of ρ/2 over all factors.
     pub(crate) fn cost(&mut self, graph: &Graph, values: &[f64]) -> f64 {
-        self.pass(graph, values, false, Take::All)
+        self.pass(graph, values, Want::Cost, Take::All, None)
     }
 
     /// The cost; H and b are in [`Workspace::block`] and [`Workspace::gradient`] then.
     pub(crate) fn linearize(&mut self, graph: &Graph, values: &[f64], take: Take) -> f64 {
-        self.pass(graph, values, true, take)
+        self.pass(graph, values, Want::Equations, take, None)
     }
 
-    fn pass(&mut self, graph: &Graph, values: &[f64], derivatives: bool, take: Take) -> f64 {
+    /// The cost of the factors that a mask takes, by pool and place, with what is wanted of them; H is spoilt where b alone is.
+    pub(crate) fn masked(&mut self, graph: &Graph, values: &[f64], want: Want, mask: Option<&Mask>) -> f64 {
+        self.pass(graph, values, want, Take::All, mask)
+    }
+
+    fn pass(&mut self, graph: &Graph, values: &[f64], want: Want, take: Take, mask: Option<&Mask>) -> f64 {
         let layout = &self.layout;
-        let pass = Pass { graph, layout, values, derivatives, take };
-        self.shared.fill(0.0);
+        let pass = Pass { graph, layout, values, want, take, mask };
+        let derivatives = want > Want::Cost;
+        // A cost alone leaves H and b as they are: a rejected step solves with them again.
+        if derivatives {
+            self.shared.fill(0.0);
+        }
         if let [data] = &mut self.chunks[..] {
             pass.run(&layout.chunks[0], data, &mut self.shared);
             return data.cost;
@@ -88,11 +104,15 @@ impl Workspace {
         for (chunks, data) in layout.chunks.chunks(WAVE).zip(self.chunks.chunks_mut(WAVE)) {
             let copies = &mut self.wave[..chunks.len()];
             chunks.par_iter().zip(data).zip(&mut *copies).with_max_len(1).for_each(|((chunk, data), shared)| {
-                shared.fill(0.0);
+                if derivatives {
+                    shared.fill(0.0);
+                }
                 pass.run(chunk, data, shared);
             });
-            for copy in copies {
-                add_scaled(&mut self.shared, 1.0, copy);
+            if derivatives {
+                for copy in copies {
+                    add_scaled(&mut self.shared, 1.0, copy);
+                }
             }
         }
         self.chunks.iter().map(|data| data.cost).sum()
@@ -102,6 +122,31 @@ impl Workspace {
     pub(crate) fn block(&self, block: &Block) -> &[f64] {
         let active = |node: u32| usize::from(self.layout.places[node as usize].active);
         self.arena(block.chunk, block.offset, active(block.row) * active(block.column))
+    }
+
+    /// The diagonal block of the free node whose first column this is.
+    pub(crate) fn diagonal_block(&self, column: usize) -> DMatrix<f64> {
+        let layout = &self.layout;
+        let place = layout.free.binary_search_by_key(&column, |&(_, first)| first).expect("a node begins here");
+        let node = layout.free[place].0;
+        let block = layout.blocks.binary_search_by_key(&(node, node), |block| (block.column, block.row));
+        let n = usize::from(layout.places[node as usize].active);
+        DMatrix::from_column_slice(n, n, self.block(&layout.blocks[block.expect("a free node has a block")]))
+    }
+
+    /// H x.
+    pub(crate) fn multiply(&self, x: &DVector<f64>) -> DVector<f64> {
+        let mut y = DVector::zeros(x.len());
+        for block in &self.layout.blocks {
+            let span = |node: u32| (self.layout.column(node), usize::from(self.layout.places[node as usize].active));
+            let ((row, rows), (column, columns)) = (span(block.row), span(block.column));
+            let matrix = DMatrixView::from_slice(self.block(block), rows, columns);
+            y.rows_mut(row, rows).gemv(1.0, &matrix, &x.rows(column, columns), 1.0);
+            if block.row != block.column {
+                y.rows_mut(column, columns).gemv_tr(1.0, &matrix, &x.rows(row, rows), 1.0);
+            }
+        }
+        y
     }
 
     fn arena(&self, chunk: u32, offset: Offset, len: usize) -> &[f64] {
@@ -173,13 +218,14 @@ struct Pass<'a> {
     graph: &'a Graph,
     layout: &'a Layout,
     values: &'a [f64],
-    derivatives: bool,
+    want: Want,
     take: Take,
+    mask: Option<&'a Mask>,
 }
 
 impl Pass<'_> {
     fn run(&self, chunk: &Chunk, data: &mut ChunkData, shared: &mut [f64]) {
-        if self.derivatives {
+        if self.want > Want::Cost {
             data.private.fill(0.0);
         }
         for plan in &chunk.functions {
@@ -193,22 +239,38 @@ impl Pass<'_> {
             private: &mut data.private,
             shared,
             offsets: &chunk.offsets,
-            derivatives: self.derivatives,
+            want: self.want,
             graduation: self.graph.graduation,
             cost: 0.0,
             scratch: &mut data.scratch,
         };
-        for (pool, range) in &chunk.runs {
-            let pool = &self.graph.factors[*pool as usize];
-            if self.take == Take::Data && pool.is_prior() {
-                range.clone().for_each(|_| run.skip(1));
-            } else {
-                pool.run(range.clone(), &mut run);
+        for (index, range) in &chunk.runs {
+            let pool = &self.graph.factors[*index as usize];
+            let taken = match self.take {
+                Take::All => true,
+                Take::Data => !pool.is_prior(),
+                Take::Priors => pool.is_prior(),
+            };
+            if !taken {
+                range.clone().for_each(|place| run.skip(pool.nodes(place).len()));
+                continue;
+            }
+            match self.mask {
+                None => pool.run(range.clone(), &mut run),
+                Some(mask) => {
+                    for place in range.clone() {
+                        if mask[*index as usize][place] {
+                            pool.run(place..place + 1, &mut run);
+                        } else {
+                            run.skip(pool.nodes(place).len());
+                        }
+                    }
+                }
             }
         }
-        if self.derivatives {
+        if self.want > Want::Cost {
             for plan in chunk.functions.iter().rev() {
-                self.substitute(plan, &mut run);
+                substitute(self.graph, plan, &mut run);
             }
         }
         data.cost = run.cost;
@@ -224,7 +286,7 @@ impl Pass<'_> {
         let y = &mut after[..usize::from(place.ambient)];
         let arguments = arguments(parents, nodes, places, self.values, before);
         let (x, columns) = (&arguments.x[..parents.len()], &arguments.columns[..parents.len()]);
-        if !self.derivatives || place.active == 0 {
+        if self.want == Want::Cost || place.active == 0 {
             pool.evaluate(plan.place as usize, x, y, None);
             return;
         }
@@ -234,136 +296,5 @@ impl Pass<'_> {
         pool.evaluate(plan.place as usize, x, y, Some(jacobian));
         let len = rows * compact(g, rows, arguments.width, columns, &mut [0; MOST]);
         data.private[plan.jacobian..plan.jacobian + len].copy_from_slice(&g[..len]);
-    }
-
-    /// Moves all that H and b say of a derived node d = f(P) to its parents P, with G = ∂d/∂P:
-    ///
-    ///   b_P += Gᵀ b_d      H_PP += Gᵀ H_dd G      H_Px += Gᵀ H_dx for every other node x
-    ///
-    /// and, where x is itself a parent, H_xx += Gᵀ H_dx + H_xd G.
-    fn substitute(&self, plan: &FunctionPlan, run: &mut Run<'_>) {
-        let places = run.places;
-        let place = &places[plan.node as usize];
-        let rows = usize::from(place.active);
-        if rows == 0 {
-            return;
-        }
-        let parents = self.graph.functions[plan.pool as usize].nodes(plan.place as usize);
-        let dim = |node: u32| usize::from(places[node as usize].active);
-        let width: usize = parents.iter().map(|&parent| dim(parent)).sum();
-        let mut scratch = std::mem::take(&mut run.scratch.product);
-        let needed = 2 * rows * width + rows * rows + rows;
-        let (g, rest) = grown(&mut scratch, needed).split_at_mut(rows * width);
-        let (product, rest) = rest.split_at_mut(rows * width);
-        let (h, b) = rest.split_at_mut(rows * rows);
-        g.copy_from_slice(&run.private[plan.jacobian..plan.jacobian + rows * width]);
-        h.copy_from_slice(run.block(plan.diagonal, rows * rows));
-        b.copy_from_slice(run.block(place.gradient, rows));
-
-        // product = H_dd G, by rows.
-        product.fill(0.0);
-        for (i, row) in product.chunks_exact_mut(width).enumerate() {
-            for (k, g) in g.chunks_exact(width).enumerate() {
-                add_scaled(row, h[i + k * rows], g);
-            }
-        }
-        let mut pair = 0;
-        let mut start_a = 0;
-        for (a, &first) in parents.iter().enumerate() {
-            let da = dim(first);
-            if da > 0 {
-                let gradient = run.block(places[first as usize].gradient, da);
-                for (g, &b) in g.chunks_exact(width).zip(&*b) {
-                    add_scaled(gradient, b, &g[start_a..start_a + da]);
-                }
-            }
-            let mut start_b = start_a;
-            for &second in &parents[a..] {
-                let (db, offset) = (dim(second), plan.parents[pair]);
-                pair += 1;
-                if offset != Offset::NONE {
-                    let block = run.block(offset, da * db);
-                    let (ga, pb) = ((&*g, start_a, da), (&*product, start_b, db));
-                    let (pa, gb) = ((&*product, start_a, da), (&*g, start_b, db));
-                    if first <= second {
-                        add_product_of(block, ga, width, pb, width, rows);
-                    } else {
-                        add_product_of(block, gb, width, pa, width, rows);
-                    }
-                    if first == second && start_a != start_b {
-                        add_product_of(block, gb, width, pa, width, rows);
-                    }
-                }
-                start_b += db;
-            }
-            start_a += da;
-        }
-        for (other, own, with_parents) in &plan.neighbours {
-            self.substitute_neighbour(plan, (*other, *own), with_parents, g, width, run);
-        }
-        run.scratch.product = scratch;
-    }
-
-    /// H_Px += Gᵀ H_dx for one node x.
-    fn substitute_neighbour(
-        &self,
-        plan: &FunctionPlan,
-        (other, own): (u32, Offset),
-        with_parents: &[Offset],
-        g: &[f64],
-        width: usize,
-        run: &mut Run<'_>,
-    ) {
-        let places = run.places;
-        let dim = |node: u32| usize::from(places[node as usize].active);
-        let (rows, columns) = (dim(plan.node), dim(other));
-        let parents = self.graph.functions[plan.pool as usize].nodes(plan.place as usize);
-        let mut s = std::mem::take(&mut run.scratch.residual);
-        // s = H_dx by rows, whichever of the two has the rows of the stored block.
-        let s_rows = grown(&mut s, rows * columns);
-        let block = run.block(own, rows * columns);
-        for i in 0..rows {
-            for j in 0..columns {
-                s_rows[i * columns + j] = if plan.node < other { block[i + j * rows] } else { block[j + i * columns] };
-            }
-        }
-        let mut start = 0;
-        for (&parent, &offset) in parents.iter().zip(with_parents) {
-            let d = dim(parent);
-            if offset != Offset::NONE {
-                let block = run.block(offset, d * columns);
-                let (gp, sx) = ((g, start, d), (&*s_rows, 0, columns));
-                if parent <= other {
-                    add_product_of(block, gp, width, sx, columns, rows);
-                }
-                if parent >= other {
-                    add_product_of(block, sx, columns, gp, width, rows);
-                }
-            }
-            start += d;
-        }
-        run.scratch.residual = s;
-    }
-}
-
-/// Columns `start..start + len` of a matrix stored by rows: (matrix, start, len).
-type Slice<'a> = (&'a [f64], usize, usize);
-
-/// block += Aᵀ B; the block is stored by columns, with A's columns as rows.
-#[inline]
-fn add_product_of(
-    block: &mut [f64],
-    (a, start_a, da): Slice<'_>,
-    width_a: usize,
-    (b, start_b, db): Slice<'_>,
-    width_b: usize,
-    rows: usize,
-) {
-    for i in 0..rows {
-        let a = &a[i * width_a + start_a..i * width_a + start_a + da];
-        let b = &b[i * width_b + start_b..i * width_b + start_b + db];
-        for (column, &s) in block.chunks_exact_mut(da).zip(b) {
-            add_scaled(column, s, a);
-        }
     }
 }

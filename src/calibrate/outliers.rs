@@ -40,6 +40,9 @@ const IMAGE: f64 = 10.0;
 /// Images count as shifted where the squares of their mean errors are this many times what noise explains.
 const SHIFTED: f64 = 4.0;
 
+/// A camera's images are further off than the others' where their usual distance is this many times as large.
+const FURTHER: f64 = 2.0;
+
 /// Median of |x| for a two-dimensional Gaussian of unit variance per axis.
 const MEDIAN_DISTANCE: f64 = 1.177_410_022_515_474_6;
 
@@ -103,33 +106,44 @@ pub(crate) fn distances(setup: &Setup, state: &State) -> Vec<f64> {
     setup.observations.iter().map(distance).collect()
 }
 
-/// True where images are shifted as a whole by more than the noise of their detections explains: something moved that the
-/// model holds still.
-pub(crate) fn images_are_shifted(setup: &Setup, state: &State, left_out: &[bool]) -> bool {
+/// The camera that moved: its images are shifted as a whole by more than the noise of their detections explains, and lie
+/// further off than those of the other cameras. The worst, where there are several.
+pub(crate) fn moved_camera(setup: &Setup, state: &State, verdict: &Verdict) -> Option<usize> {
     let links: Vec<_> = setup.joints.iter().map(|joints| state.model.links(joints)).collect();
-    let mut images: BTreeMap<(usize, usize), (Vector2<f64>, f64, f64)> = BTreeMap::new();
-    for (seen, _) in setup.observations.iter().zip(left_out).filter(|(_, out)| !**out) {
+    let mut images: BTreeMap<(usize, usize), Vec<Vector2<f64>>> = BTreeMap::new();
+    for (seen, _) in setup.observations.iter().zip(&verdict.left_out).filter(|(_, out)| !**out) {
         let predicted = state.model.pixel(seen.camera, seen.feature, &links[seen.sample]);
-        let error = Vector2::from(predicted) - Vector2::from(seen.pixel);
-        let image = images.entry((seen.sample, seen.camera)).or_default();
-        *image = (image.0 + error, image.1 + error.norm_squared(), image.2 + 1.0);
+        images
+            .entry((seen.camera, seen.sample))
+            .or_default()
+            .push(Vector2::from(predicted) - Vector2::from(seen.pixel));
     }
-    // |mean|² against the scatter about it, in units of what independent noise gives: 1 on average for good data.
-    let ratio = |&(sum, squares, n): &(Vector2<f64>, f64, f64)| {
-        let shift = sum.norm_squared() / n;
-        let scatter = (squares - shift) / (n - 1.0);
-        (n >= 4.0).then(|| shift / scatter.max(1e-12))
+    let usual_distance = |select: &dyn Fn(usize) -> bool| {
+        let of_image = |errors: &Vec<Vector2<f64>>| median(&mut errors.iter().map(|e| e.norm()).collect::<Vec<_>>());
+        let mut distances: Vec<f64> =
+            images.iter().filter(|(key, _)| select(key.0)).map(|(_, errors)| of_image(errors)).collect();
+        median(&mut distances)
     };
-    let mut ratios: Vec<f64> = images.values().filter_map(ratio).collect();
-    median(&mut ratios) > SHIFTED
+    let ratio = |camera: usize| {
+        let others = usual_distance(&|other| other != camera);
+        usual_distance(&|other| other == camera) / others.max(MEDIAN_DISTANCE * setup.sigma())
+    };
+    let shift = |camera: usize| {
+        let of_camera = images.iter().filter(|(key, errors)| key.0 == camera && errors.len() >= 4);
+        median(&mut of_camera.map(|(_, errors)| shift(errors)).collect::<Vec<_>>())
+    };
+    let still = (0..verdict.moved.len()).filter(|&camera| !verdict.moved[camera]);
+    let candidates: Vec<(usize, f64)> = still.map(|camera| (camera, ratio(camera))).collect();
+    let worst = candidates.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (candidates.len() > 1 && worst.1 > FURTHER && shift(worst.0) > SHIFTED).then_some(worst.0)
 }
 
-/// Median distance over the observations of the cameras but one that are not left out [px].
-pub(crate) fn median_without(setup: &Setup, state: &State, left_out: &[bool], camera: usize) -> f64 {
-    let counted = setup.observations.iter().zip(distances(setup, state)).zip(left_out);
-    let mut others: Vec<f64> =
-        counted.filter(|((seen, _), out)| !**out && seen.camera != camera).map(|((_, d), _)| d).collect();
-    median(&mut others)
+/// |mean error|² of an image over what independent errors of their scatter would give it: 1 on average for good data.
+fn shift(errors: &[Vector2<f64>]) -> f64 {
+    let n = errors.len() as f64;
+    let shift = errors.iter().sum::<Vector2<f64>>().norm_squared() / n;
+    let squares: f64 = errors.iter().map(Vector2::norm_squared).sum();
+    shift * (n - 1.0) / (squares - shift).max(1e-12)
 }
 
 fn report(

@@ -1,6 +1,6 @@
 //! The end-to-end fit among wrong data: fit with a loss that lets go of outliers, judge, leave out, and again.
 use super::graph::{Freedom, Priors, State};
-use super::outliers::{Verdict, images_are_shifted, judge, median_without};
+use super::outliers::{Verdict, judge, moved_camera};
 use super::setup::Setup;
 use super::stage::Stages;
 use crate::Error;
@@ -11,9 +11,6 @@ const WIDTHS: [f64; 2] = [20.0, 3.0];
 
 /// Rounds of fitting and judging at most.
 const ROUNDS: usize = 8;
-
-/// A camera moved where the others fit better without it by this factor in the median.
-const SPOILS: f64 = 0.75;
 
 /// Fits robustly until the verdict on images, samples and cameras no longer changes.
 pub(crate) fn fit(
@@ -36,41 +33,11 @@ pub(crate) fn fit(
         if verdict.left_out != before {
             continue;
         }
-        if !images_are_shifted(setup, state, &verdict.left_out) {
-            break;
-        }
-        let spoiler = camera_that_spoils(setup, state, freedom, priors, stages, verdict)?;
-        let Some((camera, without)) = spoiler else { break };
-        *state = without;
+        let Some(camera) = moved_camera(setup, state, verdict) else { break };
         verdict.moved[camera] = true;
         *verdict = judge(setup, state, &before, &verdict.moved);
     }
     Ok(())
-}
-
-/// The camera without which the others fit clearly better, and the fit without it.
-fn camera_that_spoils(
-    setup: &Setup,
-    state: &State,
-    freedom: &Freedom,
-    priors: &Priors,
-    stages: &mut Stages<'_>,
-    verdict: &Verdict,
-) -> Result<Option<(usize, State)>, Error> {
-    let still: Vec<usize> = (0..verdict.moved.len()).filter(|&camera| !verdict.moved[camera]).collect();
-    let mut worst: Option<(f64, usize, State)> = None;
-    for &camera in still.iter().filter(|_| still.len() > 1) {
-        let mut without = state.clone();
-        let takes_part = |index: usize| !verdict.left_out[index] && setup.observations[index].camera != camera;
-        let loss = Loss::Cauchy(WIDTHS[1]);
-        stages.minimize("leaving out one camera", setup, &mut without, freedom, priors, loss, takes_part)?;
-        let ratio = median_without(setup, &without, &verdict.left_out, camera)
-            / median_without(setup, state, &verdict.left_out, camera);
-        if ratio < SPOILS && worst.as_ref().is_none_or(|worst| ratio < worst.0) {
-            worst = Some((ratio, camera, without));
-        }
-    }
-    Ok(worst.map(|(_, camera, state)| (camera, state)))
 }
 
 /// Puts cameras that moved where they were for most of the recording, with everything else held.

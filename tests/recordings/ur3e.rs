@@ -126,30 +126,3 @@ fn every_mistake_of_the_whole_recording_is_named_and_nothing_else() {
     assert_eq!(images, WRONG_IMAGES.map(|sample| (sample, "cam4")));
     assert_eq!(moved, ["cam3"]);
 }
-
-#[test]
-fn debug_compare() {
-    let Some((rig, recording)) = read() else { return };
-    for (name, s24, cam3, wrong) in [
-        ("all clean but 24,25", true, false, false),
-        ("clean+cam3", false, true, false),
-        ("clean+wrong images", false, false, true),
-        ("24 + cam3", true, true, false),
-    ] {
-        let training = part(
-            &recording,
-            |s| !is_held_out(s) && (s24 || (s != 24 && s != 25)),
-            |s, c| (cam3 || c != "cam3") && (wrong || !(c == "cam4" && WRONG_IMAGES.contains(&s))),
-        );
-        let l = learn(&rig, &training);
-        println!(
-            "{name}: training {:.3} median {:.3} held out {:.3}",
-            l.report.rms_px,
-            l.report.median_px,
-            held_out(&l, &recording).total.rms_px
-        );
-        for s in &l.report.findings {
-            println!("   {s}");
-        }
-    }
-}

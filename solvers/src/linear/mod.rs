@@ -1,5 +1,6 @@
 //! Linear solvers for the normal equations, behind one trait and chosen from their structure.
 mod dense;
+mod independent;
 mod schur;
 mod sparse;
 
@@ -8,6 +9,7 @@ pub use schur::Schur;
 pub use sparse::Sparse;
 
 use crate::Workspace;
+use std::ops::Range;
 
 /// Solves (H + D) x = y for the H of a linearised workspace and a diagonal D >= 0.
 pub trait LinearSolver: Send {
@@ -19,6 +21,18 @@ pub trait LinearSolver: Send {
 
     /// Solves in place with the last factorisation.
     fn solve(&mut self, y: &mut [f64]);
+
+    /// Solves in place where `y` is zero outside the columns of `given` and only the columns of `wanted` are needed; the others
+    /// may hold anything afterwards. A solver that eliminates blocks passes over the rest of them.
+    fn solve_part(&mut self, y: &mut [f64], given: &[Range<usize>], wanted: &[Range<usize>]) {
+        let _ = (given, wanted);
+        self.solve(y);
+    }
+
+    /// First columns of the blocks that are eliminated, ascending, and the columns of one block.
+    fn eliminated(&self) -> (&[usize], usize) {
+        (&[], 0)
+    }
 }
 
 /// Largest number of columns that a dense factorisation is used for.

@@ -3,18 +3,18 @@
 //! With H = [E W; Wᵀ S] and E block-diagonal, blocks L Lᵀ = E_k and V_k = L⁻¹ W_k give the reduced system
 //! (S - Σ V_kᵀ V_k) x = y_s - Σ V_kᵀ L⁻¹ y_k, after which x_k = L⁻ᵀ (L⁻¹ y_k - V_k x).
 use super::dense::Factorization;
+use super::independent::independent;
 use super::{LinearSolver, scatter_lower};
 use crate::Workspace;
 use crate::layout::Block;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, MatMut, MatRef, Par};
-use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Rows of V that one matrix product takes.
 const BATCH: usize = 512;
 
-/// The largest block that is eliminated, and the largest number of columns that may remain.
-const LARGEST: usize = 16;
+/// The largest number of columns that may remain.
 const REMAINING: usize = 600;
 
 /// Eliminates the free nodes of one size that no factor ties to each other.
@@ -29,8 +29,8 @@ pub struct Schur {
     coupling: Vec<Coupling>,
     /// (first column in the system, first remaining column, columns) of every remaining node.
     remaining: Vec<(usize, usize, usize)>,
-    /// Blocks between remaining nodes with their spans.
-    rest: Vec<(Block, (usize, usize), (usize, usize))>,
+    /// Blocks between remaining nodes with the spans of their rows and columns.
+    rest: Vec<(Block, Span, Span)>,
     /// L_k by columns, and V by rows of k: (size k + i) of V is one row of `n` numbers.
     factors: Vec<f64>,
     v: Vec<f64>,
@@ -38,6 +38,9 @@ pub struct Schur {
     reduced: Factorization,
     reduced_y: Vec<f64>,
 }
+
+/// (first remaining column, columns)
+type Span = (usize, usize);
 
 struct Coupling {
     k: usize,
@@ -48,26 +51,19 @@ struct Coupling {
 }
 
 impl Schur {
-    /// Finds small nodes of one size that no block ties to each other, as many columns as possible; `None` where there are
-    /// none, or where too much would remain.
+    /// Finds the size that eliminates most columns; `None` where there is none, or where too much would remain.
     pub fn new(workspace: &Workspace) -> Option<Self> {
         let layout = &workspace.layout;
         let active = |node: u32| usize::from(layout.places[node as usize].active);
-        let chosen = independent(workspace);
-        // Columns by size.
-        let mut sizes: BTreeMap<usize, usize> = BTreeMap::new();
-        for &(node, _) in layout.free.iter().filter(|&&(node, _)| chosen[node as usize]) {
-            *sizes.entry(active(node)).or_default() += active(node);
-        }
-        let (&size, &columns) = sizes.iter().max_by_key(|&(_, &columns)| columns)?;
-        let n = layout.columns - columns;
+        let (size, chosen) = independent(layout)?;
+        let n = layout.columns - size * chosen.len();
         if n == 0 || n > REMAINING {
             return None;
         }
         let mut place = vec![(false, 0); layout.places.len()];
         let (mut eliminated, mut remaining, mut next) = (Vec::new(), Vec::new(), 0);
         for &(node, column) in &layout.free {
-            if chosen[node as usize] && active(node) == size {
+            if chosen.binary_search(&node).is_ok() {
                 place[node as usize] = (true, eliminated.len());
                 eliminated.push(column);
             } else {
@@ -108,9 +104,12 @@ impl Schur {
         })
     }
 
-    /// Whether eliminating is less work than factorising everything at once.
+    /// Whether eliminating is less work than factorising everything at once: V is stored and multiplied in full, so most
+    /// blocks should be tied to much of what remains.
     pub(super) fn pays_off(&self) -> bool {
-        self.eliminated.len() * self.size > self.n / 2 && self.eliminated.len() >= 8
+        let blocks = self.eliminated.len();
+        let tied: usize = self.coupling.iter().map(|coupling| coupling.columns).sum();
+        blocks >= 8 && blocks * self.size > self.n / 2 && 5 * tied > blocks * self.n
     }
 
     /// Fills V with W and turns it into L⁻¹ W.
@@ -187,50 +186,60 @@ impl LinearSolver for Schur {
     }
 
     fn solve(&mut self, y: &mut [f64]) {
-        let (m, n) = (self.size, self.n);
+        let all = 0..y.len();
+        self.solve_part(y, std::slice::from_ref(&all), std::slice::from_ref(&all));
+    }
+
+    fn solve_part(&mut self, y: &mut [f64], given: &[Range<usize>], wanted: &[Range<usize>]) {
         for &(column, start, len) in &self.remaining {
             self.reduced_y[start..start + len].copy_from_slice(&y[column..column + len]);
         }
-        for (k, &column) in self.eliminated.iter().enumerate() {
-            let (l, own) = (&self.factors[k * m * m..(k + 1) * m * m], &mut y[column..column + m]);
-            for i in 0..m {
-                let known: f64 = (0..i).map(|j| l[i + j * m] * own[j]).sum();
-                own[i] = (own[i] - known) / l[i * (m + 1)];
-                crate::accumulate::add_scaled(&mut self.reduced_y, -own[i], &self.v[(k * m + i) * n..][..n]);
-            }
+        for columns in given {
+            self.blocks(columns).for_each(|k| self.eliminate_right_side(k, y));
         }
         self.reduced.solve(&mut self.reduced_y);
-        for (k, &column) in self.eliminated.iter().enumerate() {
-            let (l, own) = (&self.factors[k * m * m..(k + 1) * m * m], &mut y[column..column + m]);
-            for i in (0..m).rev() {
-                let row = &self.v[(k * m + i) * n..][..n];
-                let shared: f64 = row.iter().zip(&self.reduced_y).map(|(v, x)| v * x).sum();
-                let known: f64 = (i + 1..m).map(|j| l[j + i * m] * own[j]).sum();
-                own[i] = (own[i] - shared - known) / l[i * (m + 1)];
-            }
+        for columns in wanted {
+            self.blocks(columns).for_each(|k| self.substitute_back(k, y));
         }
         for &(column, start, len) in &self.remaining {
             y[column..column + len].copy_from_slice(&self.reduced_y[start..start + len]);
         }
     }
+
+    fn eliminated(&self) -> (&[usize], usize) {
+        (&self.eliminated, self.size)
+    }
 }
 
-/// Small free nodes without a block between any two of them, by node: those with fewest neighbours come first.
-fn independent(workspace: &Workspace) -> Vec<bool> {
-    let layout = &workspace.layout;
-    let mut neighbours: Vec<Vec<u32>> = vec![Vec::new(); layout.places.len()];
-    for block in layout.blocks.iter().filter(|block| block.row != block.column) {
-        neighbours[block.row as usize].push(block.column);
-        neighbours[block.column as usize].push(block.row);
+impl Schur {
+    /// The eliminated blocks that some of these columns belong to.
+    fn blocks(&self, columns: &Range<usize>) -> Range<usize> {
+        self.eliminated.partition_point(|&first| first + self.size <= columns.start)
+            ..self.eliminated.partition_point(|&first| first < columns.end)
     }
-    let small = |&node: &u32| usize::from(layout.places[node as usize].active) <= LARGEST;
-    let mut nodes: Vec<u32> = layout.free.iter().map(|&(node, _)| node).filter(small).collect();
-    nodes.sort_by_key(|&node| neighbours[node as usize].len());
-    let mut chosen = vec![false; layout.places.len()];
-    for node in nodes {
-        chosen[node as usize] = neighbours[node as usize].iter().all(|&other| !chosen[other as usize]);
+
+    /// y_k becomes L⁻¹ y_k, and the remaining right side loses V_kᵀ L⁻¹ y_k.
+    fn eliminate_right_side(&mut self, k: usize, y: &mut [f64]) {
+        let (m, n) = (self.size, self.n);
+        let (l, own) = (&self.factors[k * m * m..(k + 1) * m * m], &mut y[self.eliminated[k]..][..m]);
+        for i in 0..m {
+            let known: f64 = (0..i).map(|j| l[i + j * m] * own[j]).sum();
+            own[i] = (own[i] - known) / l[i * (m + 1)];
+            crate::accumulate::add_scaled(&mut self.reduced_y, -own[i], &self.v[(k * m + i) * n..][..n]);
+        }
     }
-    chosen
+
+    /// y_k becomes L⁻ᵀ (y_k - V_k x).
+    fn substitute_back(&self, k: usize, y: &mut [f64]) {
+        let (m, n) = (self.size, self.n);
+        let (l, own) = (&self.factors[k * m * m..(k + 1) * m * m], &mut y[self.eliminated[k]..][..m]);
+        for i in (0..m).rev() {
+            let row = &self.v[(k * m + i) * n..][..n];
+            let shared: f64 = row.iter().zip(&self.reduced_y).map(|(v, x)| v * x).sum();
+            let known: f64 = (i + 1..m).map(|j| l[j + i * m] * own[j]).sum();
+            own[i] = (own[i] - shared - known) / l[i * (m + 1)];
+        }
+    }
 }
 
 /// Cholesky factor of a small matrix in its lower triangle, stored by columns.

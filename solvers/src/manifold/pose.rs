@@ -78,6 +78,7 @@ impl<T: Scalar> Mul for Pose<T> {
     type Output = Self;
 
     #[inline]
+    #[allow(clippy::suspicious_arithmetic_impl)] // R₁ t₂ + t₁
     fn mul(self, other: Self) -> Self {
         Pose {
             rotation: so3::times(&self.rotation, &other.rotation),
@@ -122,7 +123,7 @@ impl Variable for Pose {
         }
     }
 
-    /// (I + [w]) R, which has the derivative of exp(w) R at w = 0 for a third of the work.
+    /// (I + K) R with K v = w × v, which has the derivative of exp(w) R at w = 0 for a third of the work.
     #[inline]
     fn seed<T: Scalar>(x: &[f64], delta: impl Fn(usize) -> T) -> Pose<T> {
         let w = [delta(0), delta(1), delta(2)];

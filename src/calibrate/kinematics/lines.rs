@@ -16,8 +16,6 @@ pub(crate) struct Lines {
     pub at_zero: Pose,
     /// Length, in the unit of the translations, of a unit of a prismatic joint's reading; `None` without such a joint.
     pub unit: Option<f64>,
-    /// Distance of each given translation.
-    pub distances: Vec<f64>,
 }
 
 /// Solves for points on the axes from tip poses.
@@ -74,7 +72,7 @@ pub(crate) fn find_lines(kinds: &[JointKind], axes: &Axes, joints: &[&[f64]], po
         }
     }
     let at_zero = Pose { rotation: axes.at_zero, translation: part(kinds.len()) };
-    Some(Lines { points, directions, at_zero, unit, distances })
+    Some(Lines { points, directions, at_zero, unit })
 }
 
 /// What multiplies each q_i or v_i, and p₀, in the tip's position.

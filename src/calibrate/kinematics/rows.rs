@@ -127,7 +127,6 @@ mod tests {
                 directions: links[..n].iter().map(|link| link.rotation.column(2).into_owned()).collect(),
                 at_zero: links[n],
                 unit: None,
-                distances: Vec::new(),
             };
             let (found_base, found) = rows(Convention::Dh, &kinds, &lines);
             let tip_from_found = truth.tip(&found_base, &found, &vec![0.0; n]).inverse() * links[n];
