@@ -1,4 +1,5 @@
 //! What users are promised, one file per promise.
+mod cli;
 mod malformed_input;
 mod recording_files;
 mod rig_files;
