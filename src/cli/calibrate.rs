@@ -21,8 +21,8 @@ use std::path::PathBuf;
 Examples:
   handeye calibrate motions.jsonl -o learned.toml
   handeye calibrate monday.jsonl tuesday.jsonl --rig arm.toml -o learned.toml
-  handeye calibrate motions.jsonl --rig ur5 -o learned.toml --folds 5    and judge it on samples left out
-  handeye calibrate motions.jsonl --rig arm.toml -o arm.toml             new values, the same comments")]
+  handeye calibrate motions.jsonl --rig ur5 -o learned.toml --folds 5   with held-out errors
+  handeye calibrate motions.jsonl --rig arm.toml -o arm.toml            keeps its comments")]
 pub struct Calibrate {
     /// Recordings of one rig
     #[arg(value_name = "REC", required = true)]

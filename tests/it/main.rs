@@ -4,3 +4,4 @@ mod malformed_input;
 mod recording_files;
 mod rig_files;
 mod simulate;
+mod tidy;
