@@ -12,3 +12,8 @@ pub mod simulate;
 
 pub use error::Error;
 pub use handeye_solvers as solvers;
+
+// Compiles and runs the README's Rust code.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

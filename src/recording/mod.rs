@@ -2,6 +2,7 @@
 mod join;
 mod jsonl;
 mod names;
+mod select;
 mod types;
 
 pub use jsonl::Reader;

@@ -1,5 +1,8 @@
 //! What users are promised, one file per promise.
+mod cli;
 mod malformed_input;
+mod readme;
 mod recording_files;
 mod rig_files;
 mod simulate;
+mod tidy;

@@ -1,0 +1,181 @@
+//! `handeye calibrate`: a recording to a learned rig.
+use super::answer::Answer;
+use super::counts::learned_in_words;
+use super::folds::Folds;
+use super::inputs::{check_output, read_recordings, read_rig};
+use super::progress::Bar;
+use super::words::{cameras_json, count, error_table};
+use clap::Args;
+use handeye::Error;
+use handeye::calibrate::{Calibration, Errors, Finding, Options, Report, TipDeviation, calibrate};
+use handeye::rig::Rig;
+use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// Learn what is unknown of a rig from recordings, and refine the rest
+///
+/// Without --rig everything is learned: the joints' geometry, where the cameras are, where the features are. What a rig file
+/// gives is where learning starts; what its [estimate] table holds stays. The learned rig is a rig file again.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  handeye calibrate motions.jsonl -o learned.toml
+  handeye calibrate monday.jsonl tuesday.jsonl --rig arm.toml -o learned.toml
+  handeye calibrate motions.jsonl --rig ur5 -o learned.toml --folds 5   with held-out errors
+  handeye calibrate motions.jsonl --rig arm.toml -o arm.toml            keeps its comments")]
+pub struct Calibrate {
+    /// Recordings of one rig
+    #[arg(value_name = "REC", required = true)]
+    recordings: Vec<PathBuf>,
+    /// What is known of the rig: a rig file, or the name of a shipped rig
+    #[arg(long, value_name = "RIG")]
+    rig: Option<PathBuf>,
+    /// The rig file to write; may be that of --rig
+    #[arg(short, long, value_name = "LEARNED")]
+    output: PathBuf,
+    /// Also learn K times without every K-th sample, and report how well those are predicted
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(2..))]
+    folds: Option<u32>,
+    /// Seed of every random choice: the same seed gives the same rig
+    #[arg(long, value_name = "S", default_value_t = Options::default().seed)]
+    seed: u64,
+    /// Threads to work on; the result does not depend on it [default: as many as there are cores]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+}
+
+impl Calibrate {
+    pub fn run(&self, is_json: bool) -> Result<Answer, Error> {
+        let input = self.rig.as_deref().map(read_rig).transpose()?;
+        let recording = read_recordings(&self.recordings, input.as_ref())?;
+        check_output(&self.output, &self.recordings)?;
+        let (rig, text) = input.map_or_else(|| (Rig::default(), None), |input| (input.rig, Some(input.text)));
+        let options = Options { seed: self.seed };
+        let bar = Bar::new(is_json);
+        let (folds, calibration) = on_threads(self.threads, || {
+            let folds = self.folds.map(|n| Folds::new(&rig, &recording, n as usize, &options, &bar)).transpose()?;
+            Ok((folds, calibrate(&rig, &recording, &options, &mut |progress| bar.show("", progress))?))
+        })?;
+        drop(bar);
+        let Calibration { rig: learned, report } = calibration;
+        let output = self.output.display();
+        let mut answer = Answer::new(describe(&rig, &learned, &report), report_json(&report));
+        if let Some(folds) = &folds {
+            answer.text += &format!("\n{}", folds.text());
+            answer.json["held_out"] = folds.json();
+        }
+        if report.converged {
+            learned.write(&self.output, text.as_deref())?;
+            answer.json["learned"] = json!(output.to_string());
+            answer.text +=
+                &format!("\nnext: handeye evaluate {output} FRESH.jsonl judges it on samples it has not seen\n");
+        } else {
+            let reason = "no minimum was reached, so what was learned is not to be relied on";
+            answer.failure = Some(format!(
+                "{output} was not written: {reason}; more varied motions, or a rig that gives more, would do"
+            ));
+        }
+        Ok(answer)
+    }
+}
+
+/// Runs on a pool of that many threads, or on that of the whole process.
+fn on_threads<T: Send>(threads: Option<u16>, work: impl FnOnce() -> Result<T, Error> + Send) -> Result<T, Error> {
+    let Some(threads) = threads else { return work() };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build();
+    pool.map_err(|error| Error::Unusable(format!("--threads {threads}: {error}")))?.install(work)
+}
+
+fn describe(before: &Rig, learned: &Rig, report: &Report) -> String {
+    let seconds: f64 = report.stages.iter().map(|stage| stage.seconds).sum();
+    let (samples, detections) = (count(report.samples, "sample"), count(report.observations, "detection"));
+    let mut text =
+        format!("{} from {samples} with {detections}, in {seconds:.1} s\n\n", learned_in_words(before, learned));
+    text += &error_table(&report.cameras, &together(report), report.rejected).to_string();
+    if let Some(tip) = &report.tip {
+        text += &format!("\nthe tip's position is known to {}\n", tip_in_words(tip));
+    }
+    for (title, lines) in [
+        ("what the data leave open", report.gauge.clone()),
+        ("what does not fit", report.findings.iter().map(Finding::to_string).collect()),
+    ] {
+        if !lines.is_empty() {
+            text += &format!("\n{title}:\n");
+            lines.iter().for_each(|line| text += &format!("  {line}\n"));
+        }
+    }
+    text
+}
+
+fn together(report: &Report) -> Errors {
+    let largest = report.cameras.iter().map(|camera| camera.errors.max_px).fold(0.0, f64::max);
+    Errors {
+        observations: report.observations,
+        rms_px: report.rms_px,
+        mean_px: report.mean_px,
+        median_px: report.median_px,
+        max_px: largest,
+        behind: report.cameras.iter().map(|camera| camera.errors.behind).sum(),
+    }
+}
+
+fn tip_in_words(tip: &TipDeviation) -> String {
+    let TipDeviation { median, largest, metric } = *tip;
+    if metric {
+        return format!(
+            "{:.3} mm (median standard deviation over the samples; largest {:.3} mm)",
+            1e3 * median,
+            1e3 * largest
+        );
+    }
+    format!(
+        "{median:.2e} (median standard deviation over the samples, largest {largest:.2e}; nothing metric is known, so in the model's unit)"
+    )
+}
+
+/// How a rig was learned, as the one object of `--json`.
+pub fn report_json(report: &Report) -> Value {
+    let stage = |stage: &handeye::calibrate::StageReport| {
+        json!({
+            "name": stage.name,
+            "iterations": stage.iterations,
+            "loss_before": stage.loss_before,
+            "loss_after": stage.loss_after,
+            "seconds": stage.seconds,
+        })
+    };
+    let metric = report.tip.filter(|tip| tip.metric);
+    json!({
+        "samples": report.samples,
+        "observations": report.observations,
+        "rejected": report.rejected,
+        "rms_px": report.rms_px,
+        "mean_px": report.mean_px,
+        "median_px": report.median_px,
+        "cameras": cameras_json(&report.cameras),
+        "stages": report.stages.iter().map(stage).collect::<Vec<_>>(),
+        "converged": report.converged,
+        "gauge": report.gauge,
+        "findings": report.findings.iter().map(finding_json).collect::<Vec<_>>(),
+        "tip_sd": report.tip.map(|tip| json!({ "median": tip.median, "largest": tip.largest, "metric": tip.metric })),
+        "tip_sd_mm": metric.map(|tip| 1e3 * tip.median),
+        "tip_sd_largest_mm": metric.map(|tip| 1e3 * tip.largest),
+    })
+}
+
+fn finding_json(finding: &Finding) -> Value {
+    let mut json = match finding {
+        Finding::Outliers { count, of } => json!({ "kind": "outliers", "count": count, "of": of }),
+        Finding::WrongJoints { sample, median_px, swapped_with } => {
+            json!({ "kind": "wrong_joints", "sample": sample, "median_px": median_px, "swapped_with": swapped_with })
+        }
+        Finding::WrongImage { sample, camera, median_px } => {
+            json!({ "kind": "wrong_image", "sample": sample, "camera": camera, "median_px": median_px })
+        }
+        Finding::CameraMoved { camera, largest_px, sample } => {
+            json!({ "kind": "camera_moved", "camera": camera, "largest_px": largest_px, "sample": sample })
+        }
+    };
+    json["text"] = json!(finding.to_string());
+    json
+}

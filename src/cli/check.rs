@@ -1,0 +1,113 @@
+//! `handeye check`: what a rig file says, and whether a recording goes with it.
+use super::answer::Answer;
+use super::counts::Counts;
+use super::inputs::{RigInput, read_recordings, read_rig};
+use super::survey::Survey;
+use super::words::{count, list};
+use clap::Args;
+use handeye::Error;
+use handeye::rig::{Camera, Model, Parent, Rig};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Say what a rig file knows, leaves open and holds, and whether a recording fits it
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  handeye check arm.toml
+  handeye check arm.toml motions.jsonl    before spending time on learning")]
+pub struct Check {
+    /// A rig file, or the name of a shipped rig
+    #[arg(value_name = "RIG")]
+    rig: PathBuf,
+    /// Recordings to hold against it
+    #[arg(value_name = "REC")]
+    recordings: Vec<PathBuf>,
+}
+
+impl Check {
+    pub fn run(&self) -> Result<Answer, Error> {
+        let input = read_rig(&self.rig)?;
+        let RigInput { rig, name, .. } = &input;
+        let counts = Counts::new(rig);
+        let total = counts.total();
+        let is_complete = Model::new(rig).is_ok() && !rig.cameras.is_empty() && !rig.features.is_empty();
+        let mut text = describe(rig, name, &counts);
+        let next = if is_complete {
+            "it is complete: it can be simulated and evaluated"
+        } else {
+            "what is unknown is learned: handeye calibrate REC --rig RIG -o LEARNED"
+        };
+        text += &format!("\n{next}\n");
+        let mut json = json!({
+            "rig": name,
+            "name": rig.name,
+            "joints": rig.robot.joints.iter().map(|joint| &joint.name).collect::<Vec<_>>(),
+            "cameras": rig.cameras.iter().map(|camera| &camera.name).collect::<Vec<_>>(),
+            "features": rig.features.iter().map(|feature| &feature.name).collect::<Vec<_>>(),
+            "known": total.known,
+            "unknown": total.unknown,
+            "held": total.held,
+            "parameters": counts.json(),
+            "unknown_paths": counts.unknown,
+            "held_paths": counts.held,
+            "complete": is_complete,
+        });
+        if !self.recordings.is_empty() {
+            let recording = read_recordings(&self.recordings, Some(&input))?;
+            let survey = Survey::new(rig, &recording);
+            text += &format!("\n{survey}");
+            json["recording"] = survey.json();
+        }
+        Ok(Answer::new(text, json))
+    }
+}
+
+fn describe(rig: &Rig, file: &str, counts: &Counts) -> String {
+    let mut text = rig.name.as_ref().map_or_else(|| format!("{file}\n"), |name| format!("{file}: {name}\n"));
+    let joints: Vec<String> = rig.robot.joints.iter().map(|joint| joint.name.clone()).collect();
+    if joints.is_empty() {
+        text += "  joints    as many as the recording has\n";
+    } else {
+        let convention = rig.robot.convention.name();
+        text += &format!("  joints    {}, {convention}: {}\n", joints.len(), list(&joints));
+    }
+    let cameras: Vec<String> = rig.cameras.iter().map(|camera| describe_camera(rig, camera)).collect();
+    if cameras.is_empty() {
+        text += "  cameras   those of the recording\n";
+    } else {
+        text += &format!("  cameras   {}: {}\n", cameras.len(), list(&cameras));
+    }
+    let features: Vec<String> = rig.features.iter().map(|feature| feature.name.clone()).collect();
+    if features.is_empty() {
+        text += "  features  those of the recording\n";
+    } else {
+        text += &format!("  features  {}: {}\n", features.len(), list(&features));
+    }
+    if let Some(fit) = &rig.fit {
+        let (samples, rejected) = (count(fit.samples, "sample"), fit.rejected);
+        text += &format!("  learned   from {samples}, {:.3} px rms, {rejected} detections left out\n", fit.rms_px);
+    }
+    text += &format!("\n{}", counts.table());
+    for (what, paths) in [("unknown", &counts.unknown), ("held", &counts.held)] {
+        if !paths.is_empty() {
+            text += &format!("\n{what}: {}\n", list(paths));
+        }
+    }
+    if !rig.estimate.prior.is_empty() {
+        let priors: Vec<String> = rig.estimate.prior.iter().map(|(path, sd)| format!("{path} ± {sd}")).collect();
+        text += &format!("\npriors: {}\n", list(&priors));
+    }
+    text
+}
+
+fn describe_camera(rig: &Rig, camera: &Camera) -> String {
+    let size = camera.size.map_or_else(String::new, |[width, height]| format!(", {width} x {height}"));
+    let model = camera.model.map_or_else(String::new, |model| format!(", {}", model.name()));
+    let place = match camera.parent {
+        Parent::World => "in the world",
+        Parent::Tip => "on the tip",
+        Parent::Link(joint) => &format!("on link {}", rig.robot.joints[joint].name),
+    };
+    format!("{} ({place}{model}{size})", camera.name)
+}

@@ -1,0 +1,74 @@
+//! Reading a rig and the recordings that go with it, and seeing in time that an output can be written.
+use handeye::Error;
+use handeye::recording::Recording;
+use handeye::rig::{Rig, catalog};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A rig that was named on the command line.
+pub struct RigInput {
+    pub rig: Rig,
+    /// The text of its file, whose comments are kept.
+    pub text: String,
+    /// What messages call it.
+    pub name: String,
+}
+
+/// Reads a rig file, or takes the shipped rig of that name where there is no such file.
+pub fn read_rig(argument: &Path) -> Result<RigInput, Error> {
+    let name = argument.display().to_string();
+    if !argument.exists()
+        && let Some((_, text)) = catalog::ALL.iter().find(|(known, _)| *known == name)
+    {
+        return Ok(RigInput { rig: catalog::rig(&name)?, text: (*text).to_owned(), name });
+    }
+    let (rig, text) = Rig::read_with_text(argument)?;
+    Ok(RigInput { rig, text, name })
+}
+
+/// Reads recordings as one, and refuses what the rig cannot be the rig of.
+pub fn read_recordings(paths: &[PathBuf], rig: Option<&RigInput>) -> Result<Recording, Error> {
+    let recording = Recording::read_all(paths)?;
+    if let Some(problem) = rig.and_then(|rig| mismatch(rig, &recording)) {
+        let file = paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
+        return Err(Error::Malformed { file, line: 1, column: 1, problem });
+    }
+    Ok(recording)
+}
+
+/// Why a recording is not one of this rig.
+fn mismatch(input: &RigInput, recording: &Recording) -> Option<String> {
+    let RigInput { rig, name, .. } = input;
+    let (ours, theirs) = (rig.robot.joints.len(), recording.joints.len());
+    if ours != theirs && ours > 0 {
+        return Some(format!("the recording has {theirs} joints, the rig {name} has {ours}"));
+    }
+    let is_used = |index: usize| {
+        let index = index as u32;
+        recording.samples.iter().any(|sample| sample.pixels.iter().any(|detection| detection.camera == index))
+    };
+    let is_known = |name: &str| rig.cameras.is_empty() || rig.cameras.iter().any(|camera| camera.name == name);
+    let (_, unknown) =
+        recording.cameras.iter().enumerate().find(|(index, camera)| !is_known(&camera.name) && is_used(*index))?;
+    let known = rig.cameras.iter().map(|camera| camera.name.as_str()).collect::<Vec<_>>().join(", ");
+    Some(format!("camera `{}` is not in the rig {name} (known: {known})", unknown.name))
+}
+
+/// Fails where an output could not be written, or would replace one of the inputs: before the work, not after it.
+pub fn check_output(path: &Path, inputs: &[PathBuf]) -> Result<(), Error> {
+    let fails = |kind: io::ErrorKind| Err(Error::Io { path: path.to_owned(), source: kind.into() });
+    if path.is_dir() {
+        return fails(io::ErrorKind::IsADirectory);
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        return fails(io::ErrorKind::NotFound);
+    }
+    let Ok(output) = path.canonicalize() else { return Ok(()) };
+    match inputs.iter().find(|input| input.canonicalize().is_ok_and(|input| input == output)) {
+        None => Ok(()),
+        Some(_) => {
+            Err(Error::Unusable(format!("{}: this would be written over, and it is an input too", path.display())))
+        }
+    }
+}

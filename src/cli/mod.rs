@@ -1,0 +1,87 @@
+//! The command line: one file per subcommand, which answers; printing and exiting happen in `answer.rs`.
+mod answer;
+mod calibrate;
+mod check;
+mod completions;
+mod counts;
+mod demo;
+mod evaluate;
+mod folds;
+mod inputs;
+mod progress;
+mod simulate;
+mod survey;
+mod table;
+mod words;
+
+pub use answer::{Refusal, print};
+
+use answer::Answer;
+use clap::Parser;
+use handeye::Error;
+use std::ffi::OsString;
+
+const EXAMPLES: &str = "\
+Examples:
+  handeye demo                                                     needs no file
+  handeye calibrate motions.jsonl -o learned.toml                  from the recording alone
+  handeye calibrate motions.jsonl --rig arm.toml -o learned.toml   from what is known of the rig
+  handeye evaluate learned.toml fresh.jsonl                        judge it on other samples
+
+Exit status: 0 done; 1 the work could not be done, with the reason; 2 unusable input or arguments.";
+
+/// Learns one model of a robot arm, its cameras and the features they track from a recording
+///
+/// The model predicts every pixel from the joints. Nothing needs to be known beforehand; what is known is used. Rigs are
+/// TOML files, recordings JSON Lines; metres, radians, seconds, pixels.
+#[derive(Parser)]
+#[command(name = "handeye", version, after_help = EXAMPLES, arg_required_else_help = true, max_term_width = 120)]
+pub struct Cli {
+    /// Print one JSON object on standard output, and nothing else there
+    #[arg(long, global = true)]
+    pub json: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(clap::Subcommand)]
+enum Command {
+    Demo(demo::Demo),
+    Check(check::Check),
+    Simulate(simulate::Simulate),
+    Calibrate(calibrate::Calibrate),
+    Evaluate(evaluate::Evaluate),
+    Completions(completions::Completions),
+}
+
+/// Reads the arguments, of which the first is the program's name.
+pub fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Cli, Refusal> {
+    let arguments: Vec<OsString> = arguments.collect();
+    let is_json = arguments.iter().any(|argument| argument == "--json");
+    Cli::try_parse_from(arguments).map_err(|error| Refusal { error, is_json })
+}
+
+impl Cli {
+    /// Does what was asked for.
+    pub fn run(&self) -> Result<Answer, Error> {
+        match &self.command {
+            Command::Demo(demo) => demo.run(self.json),
+            Command::Check(check) => check.run(),
+            Command::Simulate(simulate) => simulate.run(),
+            Command::Calibrate(calibrate) => calibrate.run(self.json),
+            Command::Evaluate(evaluate) => evaluate.run(),
+            Command::Completions(completions) => completions.run(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_do_not_clash_in_any_command() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
+}

@@ -1,0 +1,33 @@
+//! Progress on standard error, where a person is watching.
+use handeye::calibrate::Progress;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::ops::ControlFlow;
+
+/// A progress bar, or nothing: with `--json`, and where standard error is no terminal.
+pub struct Bar(ProgressBar);
+
+impl Bar {
+    pub fn new(is_json: bool) -> Self {
+        // `stderr` hides itself where it is no terminal.
+        let target = if is_json { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        let bar = ProgressBar::with_draw_target(Some(0), target);
+        let style = ProgressStyle::with_template("{elapsed:>4} {msg:<44} {bar:32} {pos}/{len}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        Bar(bar)
+    }
+
+    /// Shows what a calibration is doing, after words of the caller's own; never cancels it.
+    pub fn show(&self, prefix: &str, progress: &Progress<'_>) -> ControlFlow<()> {
+        let rms = progress.rms_px.map_or_else(String::new, |rms| format!(" ({rms:.2} px)"));
+        self.0.set_length(progress.of as u64);
+        self.0.set_position(progress.done as u64);
+        self.0.set_message(format!("{prefix}{}{rms}", progress.stage));
+        ControlFlow::Continue(())
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
