@@ -2,9 +2,13 @@
 //!
 //! `cargo bench --bench accuracy -- [--seeds N] [SETTING]...`
 use handeye::calibrate::{Options, calibrate, evaluate};
-use handeye::rig::{Estimate, Rig, catalog};
+use handeye::recording::RecordedCamera;
+use handeye::rig::Rig;
 use handeye::simulate::{SimulateOptions, random_rig, simulate};
 use std::ops::ControlFlow;
+
+#[path = "common/variants.rs"]
+mod variants;
 
 /// One row of the table: a rig per seed, what is recorded of it, and the bar.
 struct Setting {
@@ -13,59 +17,40 @@ struct Setting {
     samples: usize,
     missed: f64,
     outliers: f64,
+    /// Whether the recording's header is silent on intrinsics.
+    guess: bool,
     /// Held-out rms over the floor, and how many of 100 seeds must be within it.
     bar: (f64, usize),
 }
 
-const SETTINGS: [Setting; 8] = [
-    Setting {
-        name: "six50",
-        rig: |seed| random_rig(6, 2, 12, seed),
-        samples: 50,
-        missed: 0.0,
-        outliers: 0.0,
-        bar: (1.05, 99),
-    },
-    Setting {
-        name: "six30",
-        rig: |seed| random_rig(6, 2, 12, seed),
-        samples: 30,
-        missed: 0.0,
-        outliers: 0.0,
-        bar: (1.10, 95),
-    },
-    Setting {
-        name: "seven",
-        rig: |seed| random_rig(7, 3, 12, seed),
-        samples: 80,
-        missed: 1.0 / 3.0,
-        outliers: 0.0,
-        bar: (1.05, 99),
-    },
-    Setting {
-        name: "one",
-        rig: |seed| random_rig(6, 1, 12, seed),
-        samples: 80,
-        missed: 0.0,
-        outliers: 0.0,
-        bar: (1.05, 90),
-    },
-    Setting { name: "ur5", rig: ur5, samples: 50, missed: 0.0, outliers: 0.0, bar: (1.05, 99) },
-    Setting { name: "ur5-30", rig: ur5, samples: 30, missed: 0.0, outliers: 0.0, bar: (1.10, 95) },
-    Setting {
-        name: "outliers",
-        rig: |seed| random_rig(6, 2, 12, seed),
-        samples: 50,
-        missed: 0.0,
-        outliers: 0.05,
-        bar: (1.05, 99),
-    },
-    Setting { name: "ur5-outliers", rig: ur5, samples: 50, missed: 0.0, outliers: 0.05, bar: (1.05, 99) },
-];
+const PLAIN: Setting = Setting {
+    name: "six",
+    rig: |seed| random_rig(6, 2, 12, seed),
+    samples: 50,
+    missed: 0.0,
+    outliers: 0.0,
+    guess: false,
+    bar: (1.05, 99),
+};
 
-fn ur5(_: u64) -> Rig {
-    catalog::rig("ur5").expect("the shipped rig is valid")
-}
+const SETTINGS: [Setting; 16] = [
+    Setting { name: "six50", ..PLAIN },
+    Setting { name: "six30", samples: 30, bar: (1.10, 95), ..PLAIN },
+    Setting { name: "seven", rig: |seed| random_rig(7, 3, 12, seed), samples: 80, missed: 1.0 / 3.0, ..PLAIN },
+    Setting { name: "one", rig: |seed| random_rig(6, 1, 12, seed), samples: 80, bar: (1.05, 90), ..PLAIN },
+    Setting { name: "ur5", rig: variants::ur5, ..PLAIN },
+    Setting { name: "ur5-30", rig: variants::ur5, samples: 30, bar: (1.10, 95), ..PLAIN },
+    Setting { name: "outliers", outliers: 0.05, ..PLAIN },
+    Setting { name: "ur5-outliers", rig: variants::ur5, outliers: 0.05, ..PLAIN },
+    Setting { name: "guessed", guess: true, ..PLAIN },
+    Setting { name: "planar", rig: |seed| variants::planar(2, seed), ..PLAIN },
+    Setting { name: "planar-one", rig: |seed| variants::planar(1, seed), samples: 80, bar: (1.05, 90), ..PLAIN },
+    Setting { name: "modified", rig: variants::modified, ..PLAIN },
+    Setting { name: "prismatic", rig: variants::prismatic, ..PLAIN },
+    Setting { name: "hand", rig: |seed| variants::on_hand(1, seed), samples: 80, bar: (1.05, 90), ..PLAIN },
+    Setting { name: "hand-two", rig: |seed| variants::on_hand(2, seed), ..PLAIN },
+    Setting { name: "links", rig: variants::on_links, ..PLAIN },
+];
 
 fn main() {
     let mut names = Vec::new();
@@ -116,9 +101,14 @@ fn run(setting: &Setting, seed: u64, verbose: bool) -> f64 {
         let options = SimulateOptions { samples, seed, missed, outliers, ..Default::default() };
         simulate(&truth, &options).expect("the rig is complete and in view").recording
     };
-    let training = record(setting.samples, 2 * seed, setting.missed, setting.outliers);
+    let mut training = record(setting.samples, 2 * seed, setting.missed, setting.outliers);
     let fresh = record(100, 2 * seed + 1, 0.0, 0.0);
-    let forgotten = Rig { noise: truth.noise, estimate: Estimate::default(), ..Rig::default() };
+    let forgotten = variants::forgotten(&truth);
+    if setting.guess {
+        for camera in &mut training.cameras {
+            *camera = RecordedCamera { name: camera.name.clone(), size: camera.size, ..RecordedCamera::default() };
+        }
+    }
     match calibrate(&forgotten, &training, &Options::default(), &mut |_| ControlFlow::Continue(())) {
         Ok(learned) => {
             if verbose {

@@ -1,21 +1,13 @@
 //! The learned rig and its account, from the final state.
+use super::deviations::Deviations;
 use super::evaluate::Errors;
 use super::graph::{State, row};
 use super::outliers::{Verdict, distances};
 use super::setup::Setup;
-use super::{Calibration, CameraErrors, Report, StageReport, TipDeviation};
+use super::{Calibration, CameraErrors, Report, StageReport};
 use crate::camera::CameraModel;
 use crate::rig::{Fit, Rig};
 use handeye_solvers::Pose;
-use std::collections::BTreeMap;
-
-/// Standard deviations of what was learned.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Deviations {
-    /// By parameter path, as in the rig file's `[fit.sd]`.
-    pub by_path: BTreeMap<String, Vec<f64>>,
-    pub tip: Option<TipDeviation>,
-}
 
 /// Puts everything together.
 pub(crate) fn finish(
@@ -24,7 +16,7 @@ pub(crate) fn finish(
     verdict: Verdict,
     stages: Vec<StageReport>,
     converged: bool,
-    gauge: Vec<String>,
+    mut gauge: Vec<String>,
     deviations: Deviations,
 ) -> Calibration {
     let distances = distances(setup, state);
@@ -56,6 +48,7 @@ pub(crate) fn finish(
         .collect();
     let samples = used_samples.iter().filter(|used| **used).count();
     let rejected = left_out.iter().sum();
+    gauge.extend(deviations.weak);
     let mut rig = learned(setup, state);
     rig.fit = Some(Fit {
         samples,

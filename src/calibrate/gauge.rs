@@ -3,11 +3,12 @@
 //! Pixels do not change when the world moves with everything in it, when all lengths are scaled, when the tip's frame moves
 //! against the features on it, or when the base turns about or slides along the first axis. Where nothing that is known
 //! decides these, a rule does: values that would be redundant are held.
+use super::deviations::{coordinate_of, intrinsics_of};
 use super::graph::{Freedom, Priors, State, row};
 use super::kinematics::PARALLEL;
 use super::setup::Setup;
 use crate::chain::{Convention, JointKind};
-use crate::rig::{CameraField, JointField, Parameter, Parent};
+use crate::rig::{JointField, Parameter, Parent};
 use handeye_solvers::Pose;
 
 /// What is free in the last stage, and the rules that were needed, in words.
@@ -90,7 +91,7 @@ fn hold_fixed(setup: &Setup, freedom: &mut Freedom) {
         match parameter {
             Parameter::Base => freedom.base = [true; 6],
             Parameter::JointField { joint, field } => {
-                let coordinate = JointField::ALL.iter().position(|other| *other == field).unwrap_or(0);
+                let coordinate = coordinate_of(field);
                 freedom.parameters[row(joint) + coordinate] = true;
                 if field == JointField::Alpha && setup.rig.robot.joints[joint].beta.is_none() {
                     freedom.parameters[row(joint) + 4] = true;
@@ -98,14 +99,8 @@ fn hold_fixed(setup: &Setup, freedom: &mut Freedom) {
             }
             Parameter::CameraPose(camera) => freedom.cameras[camera] = [true; 6],
             Parameter::CameraField { camera, field } => {
-                let held = &mut freedom.intrinsics[camera];
-                match field {
-                    CameraField::Fx => held[0] = true,
-                    CameraField::Fy => held[1] = true,
-                    CameraField::Cx => held[2] = true,
-                    CameraField::Cy => held[3] = true,
-                    CameraField::Distortion => held[4..].fill(true),
-                }
+                let distortion = setup.model.cameras[camera].model.distortion().len();
+                freedom.intrinsics[camera][intrinsics_of(field, distortion)].fill(true);
             }
             Parameter::FeatureXyz(feature) => freedom.features[feature] = [true; 3],
         }

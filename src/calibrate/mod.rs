@@ -1,5 +1,6 @@
 //! Learns a rig from a recording.
 mod anchor;
+mod deviations;
 pub(crate) mod evaluate;
 mod finish;
 mod gauge;
@@ -76,18 +77,20 @@ pub fn calibrate(
     } else {
         initialise::initialise(&setup, &priors, options.seed, &mut stages)?
     };
-    let (freedom, gauge) = gauge::end_to_end(&setup, &mut state, &priors);
+    let (mut freedom, gauge) = gauge::end_to_end(&setup, &mut state, &priors);
     let mut verdict = Verdict::all(&setup);
     robust::fit(&setup, &mut state, &freedom, &priors, &mut stages, &mut verdict)?;
     let report =
         stages.minimize("end to end", &setup, &mut state, &freedom, &priors, Loss::Cauchy(TAILS), |index| {
             verdict.active[index]
         })?;
+    robust::hold_moved(&mut freedom, &verdict);
     robust::place_moved(&setup, &mut state, &freedom, &priors, &mut stages, &verdict)?;
     let converged = report.termination.converged();
     let unseen = setup.unseen.iter().map(|camera| Finding::UnseenCamera { camera: camera.clone() });
     verdict.findings.splice(0..0, unseen);
-    let deviations = finish::Deviations::default();
+    let built = graph::build(&setup, &state, &freedom, &priors, Loss::Cauchy(TAILS), |index| verdict.active[index]);
+    let deviations = deviations::deviations(&setup, &state, &freedom, &verdict, &built);
     Ok(finish::finish(&setup, &state, verdict, stages.reports, converged, gauge, deviations))
 }
 

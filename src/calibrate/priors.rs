@@ -1,4 +1,5 @@
 //! What is known before anything is learned, as standard deviations around given values.
+use super::deviations::coordinate_of;
 use super::graph::{Priors, row};
 use super::setup::Setup;
 use crate::rig::{CameraField, JointField, Parameter};
@@ -37,14 +38,8 @@ impl Priors {
             match parameter {
                 Parameter::Base => priors.base = pose(sd(ANGLE), sd(LENGTH)),
                 Parameter::JointField { joint, field } => {
-                    let (coordinate, default) = match field {
-                        JointField::Offset => (0, ANGLE),
-                        JointField::D => (1, LENGTH),
-                        JointField::A => (2, LENGTH),
-                        JointField::Alpha => (3, ANGLE),
-                        JointField::Beta => (4, ANGLE),
-                    };
-                    priors.parameters[row(joint) + coordinate] = sd(default);
+                    let is_length = matches!(field, JointField::D | JointField::A);
+                    priors.parameters[row(joint) + coordinate_of(field)] = sd(if is_length { LENGTH } else { ANGLE });
                 }
                 Parameter::CameraPose(camera) => priors.cameras[camera] = pose(sd(CAMERA_ANGLE), sd(CAMERA_LENGTH)),
                 Parameter::CameraField { camera, field } => {

@@ -40,6 +40,14 @@ pub(crate) fn fit(
     Ok(())
 }
 
+/// Cameras that moved say nothing of anything else, and nothing is said of how well their poses are known.
+pub(crate) fn hold_moved(freedom: &mut Freedom, verdict: &Verdict) {
+    for (camera, _) in verdict.moved.iter().enumerate().filter(|(_, moved)| **moved) {
+        freedom.cameras[camera] = [true; 6];
+        freedom.intrinsics[camera] = [true; 12];
+    }
+}
+
 /// Puts cameras that moved where they were for most of the recording, with everything else held.
 pub(crate) fn place_moved(
     setup: &Setup,
@@ -58,7 +66,7 @@ pub(crate) fn place_moved(
     only.intrinsics.fill([true; 12]);
     only.features.fill([true; 3]);
     for (held, moved) in only.cameras.iter_mut().zip(&verdict.moved) {
-        *held = held.map(|held| held || !moved);
+        *held = [!moved; 6];
     }
     let takes_part = |index: usize| verdict.moved[setup.observations[index].camera];
     stages.minimize("cameras that moved", setup, state, &only, priors, Loss::Cauchy(WIDTHS[1]), takes_part)?;
