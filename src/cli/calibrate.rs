@@ -4,7 +4,7 @@ use super::counts::learned_in_words;
 use super::folds::Folds;
 use super::inputs::{check_output, read_recordings, read_rig};
 use super::progress::Bar;
-use super::words::{cameras_json, count, error_table};
+use super::words::{cameras_json, count, duration, error_table};
 use clap::Args;
 use handeye::Error;
 use handeye::calibrate::{Calibration, Errors, Finding, Options, Report, TipDeviation, calibrate};
@@ -52,14 +52,17 @@ impl Calibrate {
         let (rig, text) = input.map_or_else(|| (Rig::default(), None), |input| (input.rig, Some(input.text)));
         let options = Options { seed: self.seed };
         let bar = Bar::new(is_json);
-        let (folds, calibration) = on_threads(self.threads, || {
+        let (folds, calibration, seconds) = on_threads(self.threads, || {
             let folds = self.folds.map(|n| Folds::new(&rig, &recording, n as usize, &options, &bar)).transpose()?;
-            Ok((folds, calibrate(&rig, &recording, &options, &mut |progress| bar.show("", progress))?))
+            let start = std::time::Instant::now();
+            let calibration = calibrate(&rig, &recording, &options, &mut |progress| bar.show("", progress))?;
+            Ok((folds, calibration, start.elapsed().as_secs_f64()))
         })?;
         drop(bar);
         let Calibration { rig: learned, report } = calibration;
         let output = self.output.display();
-        let mut answer = Answer::new(describe(&rig, &learned, &report), report_json(&report));
+        let mut answer = Answer::new(describe(&rig, &learned, &report, seconds), report_json(&report));
+        answer.json["seconds"] = json!(seconds);
         if let Some(folds) = &folds {
             answer.text += &format!("\n{}", folds.text());
             answer.json["held_out"] = folds.json();
@@ -86,17 +89,16 @@ fn on_threads<T: Send>(threads: Option<u16>, work: impl FnOnce() -> Result<T, Er
     pool.map_err(|error| Error::Unusable(format!("--threads {threads}: {error}")))?.install(work)
 }
 
-fn describe(before: &Rig, learned: &Rig, report: &Report) -> String {
-    let seconds: f64 = report.stages.iter().map(|stage| stage.seconds).sum();
+fn describe(before: &Rig, learned: &Rig, report: &Report, seconds: f64) -> String {
     let (samples, detections) = (count(report.samples, "sample"), count(report.observations, "detection"));
-    let mut text =
-        format!("{} from {samples} with {detections}, in {seconds:.1} s\n\n", learned_in_words(before, learned));
+    let learned = learned_in_words(before, learned);
+    let mut text = format!("{learned} from {samples} with {detections}, in {}\n\n", duration(seconds));
     text += &error_table(&report.cameras, &together(report), report.rejected).to_string();
     if let Some(tip) = &report.tip {
         text += &format!("\nthe tip's position is known to {}\n", tip_in_words(tip));
     }
     for (title, lines) in [
-        ("what the data leave open", report.gauge.clone()),
+        ("what the data leave open, and how it was fixed", report.gauge.clone()),
         ("what does not fit", report.findings.iter().map(Finding::to_string).collect()),
     ] {
         if !lines.is_empty() {

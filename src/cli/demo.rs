@@ -3,7 +3,7 @@ use super::answer::Answer;
 use super::calibrate::report_json;
 use super::progress::Bar;
 use super::table::Table;
-use super::words::{count, px};
+use super::words::{count, duration, px};
 use super::{counts::learned_in_words, evaluate};
 use clap::Args;
 use handeye::Error;
@@ -49,19 +49,20 @@ impl Demo {
 
         let observations: usize = recording.samples.iter().map(|sample| sample.pixels.len()).sum();
         let mut text = format!(
-            "1. {} moves at random before {}: {}, {}, {} px noise per axis.\n",
+            "1. {}, moves at random: {}, {}, {} px noise per axis.\n",
             rig.name.as_deref().unwrap_or(RIG),
-            count(rig.cameras.len(), "camera"),
             count(recording.samples.len(), "sample"),
             count(observations, "detection"),
             rig.noise.pixels,
         );
         text += &format!(
-            "2. The rig is forgotten, and learned from the recording alone:\n   {}, in {seconds:.1} s.\n",
+            "2. The rig is forgotten, and learned from the recording alone in {}:\n   {}.\n",
+            duration(seconds),
             learned_in_words(&Rig::default(), &learned.rig)
         );
-        for gauge in &learned.report.gauge {
-            text += &format!("   left open by the data: {gauge}\n");
+        if !learned.report.gauge.is_empty() {
+            text += "   What pixels and joints leave open is fixed by rule:\n";
+            learned.report.gauge.iter().for_each(|line| text += &format!("     {line}\n"));
         }
         text += &format!(
             "3. What was learned predicts the pixels of {} more from their joints:\n\n",

@@ -20,6 +20,11 @@ pub fn px(value: f64) -> String {
     format!("{value:.3}")
 }
 
+/// A time as people tell it.
+pub fn duration(seconds: f64) -> String {
+    if seconds < 1.0 { format!("{:.0} ms", 1e3 * seconds) } else { format!("{seconds:.1} s") }
+}
+
 /// Errors per camera and together, one row each.
 pub fn error_table(cameras: &[CameraErrors], together: &Errors, rejected: usize) -> Table {
     let mut table = Table::new(&["camera", "detections", "left out", "rms px", "mean px", "median px", "largest px"]);

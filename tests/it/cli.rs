@@ -19,12 +19,12 @@ impl Folder {
         &self.0
     }
 
-    fn write(&self, name: &str, text: &str) -> &Self {
+    pub fn write(&self, name: &str, text: &str) -> &Self {
         fs::write(self.0.join(name), text).unwrap();
         self
     }
 
-    fn read(&self, name: &str) -> String {
+    pub fn read(&self, name: &str) -> String {
         fs::read_to_string(self.0.join(name)).unwrap()
     }
 
@@ -33,7 +33,7 @@ impl Folder {
         Command::new(env!("CARGO_BIN_EXE_handeye")).args(arguments).current_dir(&self.0).output().unwrap()
     }
 
-    fn names(&self) -> Vec<String> {
+    pub fn names(&self) -> Vec<String> {
         let mut names: Vec<String> =
             fs::read_dir(&self.0).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
         names.sort();
@@ -41,7 +41,7 @@ impl Folder {
     }
 
     /// Runs, expects an exit status, and gives what was written on standard output and standard error.
-    fn expect(&self, status: i32, arguments: &str) -> (String, String) {
+    pub fn expect(&self, status: i32, arguments: &str) -> (String, String) {
         let output = self.run(arguments);
         let [out, err] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
         assert_eq!(output.status.code(), Some(status), "handeye {arguments}\n{out}{err}");

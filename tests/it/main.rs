@@ -1,5 +1,6 @@
 //! What users are promised, one file per promise.
 mod cli;
+mod cli_calibrate;
 mod malformed_input;
 mod readme;
 mod recording_files;

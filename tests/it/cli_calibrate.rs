@@ -1,0 +1,94 @@
+//! Learning from the command line: a rig file that every other command reads, the same bytes every time, and its report.
+use crate::cli::Folder;
+use handeye::rig::{Model, Rig, catalog};
+use serde_json::Value;
+
+fn json(folder: &Folder, arguments: &str) -> Value {
+    let (out, err) = folder.expect(0, &format!("{arguments} --json"));
+    assert_eq!(err, "", "handeye {arguments}");
+    serde_json::from_str(&out).unwrap()
+}
+
+/// A UR5's motions before two cameras, with 0.3 px noise per axis: 0.424 px rms.
+fn motions(name: &str) -> Folder {
+    let folder = Folder::new(name);
+    folder.expect(0, "simulate ur5 --samples 50 --seed 1 -o motions.jsonl");
+    folder.expect(0, "simulate ur5 --samples 50 --seed 2 -o fresh.jsonl");
+    folder
+}
+
+const FLOOR: f64 = 0.3 * std::f64::consts::SQRT_2;
+
+#[test]
+fn what_is_learned_from_nothing_predicts_what_it_has_not_seen() {
+    let folder = motions("nothing");
+    let report = json(&folder, "calibrate motions.jsonl -o learned.toml");
+    assert_eq!((&report["samples"], &report["converged"], &report["rejected"]), (&50.into(), &true.into(), &0.into()));
+    for key in ["observations", "rms_px", "mean_px", "median_px"] {
+        assert!(report[key].is_number() && report["cameras"]["left"][key].is_number(), "{key}: {report}");
+    }
+    for stage in report["stages"].as_array().unwrap() {
+        let numbers = ["iterations", "loss_after", "seconds"];
+        assert!(stage["name"].is_string() && numbers.iter().all(|key| stage[*key].is_number()), "{stage}");
+        assert!(!stage["loss_before"].is_string(), "a number, or null where there was nothing before: {stage}");
+    }
+    assert!(report["gauge"].as_array().unwrap().iter().all(Value::is_string));
+
+    let learned = Rig::parse(&folder.read("learned.toml"), "learned.toml").unwrap();
+    assert!(Model::new(&learned).is_ok(), "every value is filled in");
+    let fit = learned.fit.unwrap();
+    assert_eq!((Some(fit.rms_px), fit.samples), (report["rms_px"].as_f64(), 50));
+    let judged = json(&folder, "evaluate learned.toml fresh.jsonl");
+    assert!(judged["rms_px"].as_f64().unwrap() < 1.1 * FLOOR, "{} px", judged["rms_px"]);
+    assert_eq!(json(&folder, "check learned.toml fresh.jsonl")["complete"], true);
+}
+
+#[test]
+fn one_thread_and_two_write_the_same_bytes() {
+    let folder = motions("threads");
+    for (threads, output) in [(1, "one.toml"), (2, "two.toml"), (2, "again.toml")] {
+        folder.expect(0, &format!("calibrate motions.jsonl -o {output} --threads {threads}"));
+    }
+    assert_eq!(folder.read("one.toml"), folder.read("two.toml"));
+    assert_eq!(folder.read("two.toml"), folder.read("again.toml"));
+}
+
+#[test]
+fn a_rig_may_be_refined_in_its_place_and_keeps_its_comments() {
+    let folder = motions("place");
+    let (_, text) = catalog::ALL[0];
+    let own = "# my own words\n\n".to_owned() + text;
+    folder.write("arm.toml", &own);
+    let (out, _) = folder.expect(0, "calibrate motions.jsonl --rig arm.toml -o arm.toml");
+    assert!(out.contains("refined"), "{out}");
+    let after = folder.read("arm.toml");
+    assert!(own.lines().filter(|line| line.starts_with('#')).all(|comment| after.contains(comment)), "{after}");
+    assert_ne!(own, after);
+    let judged = json(&folder, "evaluate arm.toml fresh.jsonl");
+    assert!(judged["rms_px"].as_f64().unwrap() < 1.1 * FLOOR, "{} px", judged["rms_px"]);
+}
+
+#[test]
+fn folds_are_judged_by_rigs_that_have_not_seen_them() {
+    let folder = motions("folds");
+    let report = json(&folder, "calibrate motions.jsonl --rig ur5 -o learned.toml --folds 5");
+    let held_out = &report["held_out"];
+    let folds = held_out["folds"].as_array().unwrap();
+    assert_eq!(folds.len(), 5);
+    let sum: u64 = folds.iter().map(|fold| fold["observations"].as_u64().unwrap()).sum();
+    assert_eq!((Some(sum), &held_out["observations"]), (report["observations"].as_u64(), &report["observations"]));
+    let [held_out, fitted] = [held_out, &report].map(|errors| errors["rms_px"].as_f64().unwrap());
+    assert!(fitted < held_out && held_out < 1.2 * FLOOR, "{fitted} px fitted, {held_out} px held out");
+}
+
+#[test]
+fn the_demonstration_comes_near_the_noise_and_leaves_no_file() {
+    let folder = Folder::new("demo");
+    let story = json(&folder, "demo");
+    assert!((story["floor"]["rms_px"].as_f64().unwrap() - FLOOR).abs() < 1e-12);
+    assert!(story["rms_over_floor"].as_f64().unwrap() < 1.1, "{story}");
+    assert_eq!(story["evaluation"]["samples"], 50);
+    let (text, _) = folder.expect(0, "demo");
+    assert!(text.contains("0.424") && text.contains("fresh samples"), "{text}");
+    assert!(folder.names().is_empty());
+}
