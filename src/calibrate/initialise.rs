@@ -19,6 +19,9 @@ struct Seen {
     features: Vec<bool>,
 }
 
+/// Samples of a long recording that are looked at, at most; the others come in with the chain.
+const LOOK: usize = 400;
+
 /// A bearing may be off by this many standard deviations, or by this many pixels where intrinsics are not yet right.
 const THRESHOLD: f64 = 4.0;
 const THRESHOLD_PX: f64 = 2.0;
@@ -53,7 +56,8 @@ fn look(setup: &Setup, priors: &Priors, seed: u64, stages: &mut Stages<'_>) -> R
     let (mount, object) = if on_arm { (Parent::Tip, Parent::World) } else { (Parent::World, Parent::Tip) };
     let model = &setup.model;
     let mut samples: Vec<Vec<Sighting>> = vec![Vec::new(); setup.joints.len()];
-    for seen in &setup.observations {
+    let every = setup.joints.len().div_ceil(LOOK);
+    for seen in setup.observations.iter().filter(|seen| seen.sample % every == 0) {
         let camera = &model.cameras[seen.camera];
         if camera.parent != mount || model.features[seen.feature].parent != object {
             continue;
@@ -68,7 +72,6 @@ fn look(setup: &Setup, priors: &Priors, seed: u64, stages: &mut Stages<'_>) -> R
         Views { samples: &samples, cameras: model.cameras.len(), features: model.features.len(), threshold, seed };
     let scenes = reconstruct(&views);
     let mut best: Option<(f64, Seen)> = None;
-    let mut results = Vec::new();
     for scene in scenes {
         let Some(mut seen) = seen_from(setup, &scene, on_arm) else { continue };
         let mut freedom = Freedom::all(setup, false);
@@ -101,7 +104,6 @@ fn look(setup: &Setup, priors: &Priors, seed: u64, stages: &mut Stages<'_>) -> R
         // Missing observations are as bad as outliers.
         let missing = (setup.observations.len() - count) as f64;
         let cost = outcome.unwrap_or(f64::INFINITY) + 20.0 * missing;
-        results.push(cost);
         if best.as_ref().is_none_or(|best| cost < best.0) {
             best = Some((cost, seen));
         }
