@@ -33,6 +33,9 @@ pub enum Error {
     /// The data do not suffice, and what is missing.
     #[error("{0}")]
     NotEnoughData(String),
+    /// An observer broke the work off.
+    #[error("cancelled")]
+    Cancelled,
     /// The minimiser was given a problem that it cannot work on.
     #[error(transparent)]
     Solver(#[from] handeye_solvers::Error),

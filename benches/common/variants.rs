@@ -107,6 +107,47 @@ pub fn on_links(seed: u64) -> Rig {
     rig
 }
 
+/// Camera poses are known and held, all else is forgotten.
+pub fn cameras_held(truth: &Rig) -> Rig {
+    let mut rig = forgotten(truth);
+    rig.cameras = truth.cameras.clone();
+    rig.estimate.fixed = vec!["cameras.*.pose".to_owned()];
+    rig
+}
+
+/// The joints' twists are known and held, as are the first two link lengths.
+pub fn twists_held(truth: &Rig) -> Rig {
+    let mut rig = forgotten(truth);
+    rig.robot.joints = truth.robot.joints.clone();
+    for (index, joint) in rig.robot.joints.iter_mut().enumerate() {
+        (joint.offset, joint.d) = (None, None);
+        joint.a = joint.a.filter(|_| index < 2);
+    }
+    rig.estimate.fixed = vec!["robot.joints.*.alpha".to_owned()];
+    rig
+}
+
+/// The chain is known up to a millimetre and a milliradian, as from a data sheet.
+pub fn nominal(truth: &Rig) -> Rig {
+    let mut rig = forgotten(truth);
+    rig.robot = truth.robot.clone();
+    for (index, joint) in rig.robot.joints.iter_mut().enumerate() {
+        let sign = if index % 2 == 0 { 1e-3 } else { -1e-3 };
+        joint.offset = joint.offset.map(|offset| offset + sign);
+        joint.d = joint.d.map(|d| d - sign);
+        joint.a = joint.a.map(|a| a + sign);
+        joint.alpha = joint.alpha.map(|alpha| alpha - sign);
+    }
+    rig
+}
+
+/// The features are known, as of a printed board; the rest is forgotten.
+pub fn structure(truth: &Rig) -> Rig {
+    let mut rig = forgotten(truth);
+    rig.features = truth.features.clone();
+    rig
+}
+
 fn home(rig: &Rig) -> Vec<f64> {
     let middle =
         |joint: &handeye::rig::Joint| 0.5 * (joint.limits.lower.unwrap_or(0.0) + joint.limits.upper.unwrap_or(0.0));

@@ -4,7 +4,7 @@ use super::evaluate::Errors;
 use super::graph::{State, row};
 use super::outliers::{Verdict, distances};
 use super::setup::Setup;
-use super::{Calibration, CameraErrors, Report, StageReport};
+use super::{Calibration, CameraErrors, Finding, Report, StageReport};
 use crate::camera::CameraModel;
 use crate::rig::{Fit, Rig};
 use handeye_solvers::Pose;
@@ -59,6 +59,7 @@ pub(crate) fn finish(
         gauge: gauge.clone(),
         sd: deviations.by_path,
     });
+    let unseen = setup.unseen.iter().map(|camera| Finding::UnseenCamera { camera: camera.clone() });
     let report = Report {
         samples,
         observations: total.observations,
@@ -70,7 +71,7 @@ pub(crate) fn finish(
         stages,
         converged,
         gauge,
-        findings: verdict.findings,
+        findings: unseen.chain(verdict.findings).collect(),
         tip: deviations.tip,
     };
     Calibration { rig, report }

@@ -20,7 +20,9 @@ pub(crate) fn end_to_end(setup: &Setup, state: &mut State, priors: &Priors) -> (
     let joints = &rig.robot.joints;
     if !freedom.base[0] && rig.robot.base.is_none() && !world_is_known(setup) {
         freedom.base = [true; 6];
-        move_world(state);
+        let base_from_world = state.model.base.inverse();
+        move_world(state, &base_from_world);
+        state.model.base = Pose::identity();
         words.push("the world frame is the robot's base: nothing that is known places the world".to_owned());
     }
     let unknown = |joint: usize, coordinate: usize| priors.parameters[row(joint) + coordinate].is_infinite();
@@ -46,8 +48,8 @@ pub(crate) fn end_to_end(setup: &Setup, state: &mut State, priors: &Priors) -> (
         let redundant: &[usize] = if convention == Convention::ModifiedDh { &[0, 1] } else { &[0, 1, 2, 3] };
         hold(last, redundant, "the tip's frame can move against what is fixed to it", &mut words, &mut freedom);
     }
-    for joint in 1..joints.len() {
-        if joints[joint].kind == JointKind::Prismatic {
+    for (joint, given) in joints.iter().enumerate().skip(1) {
+        if given.kind == JointKind::Prismatic {
             let a_row = if convention == Convention::ModifiedDh { joint } else { joint - 1 };
             hold(joint - 1, &[1], "a sliding axis has a direction but no place", &mut words, &mut freedom);
             hold(a_row, &[2], "a sliding axis has a direction but no place", &mut words, &mut freedom);
@@ -118,11 +120,12 @@ pub(crate) fn world_is_known(setup: &Setup) -> bool {
         || rig.features.iter().any(|feature| feature.parent == Parent::World && feature.xyz.is_some())
 }
 
-/// Something given places the tip's frame: a camera on it, or a feature.
+/// Something given places the tip's frame: a camera on it, or a feature. Against an unknown chain they do not.
 fn tip_is_known(setup: &Setup) -> bool {
     let rig = &setup.rig;
-    rig.cameras.iter().any(|camera| camera.parent == Parent::Tip && camera.pose.is_some())
-        || rig.features.iter().any(|feature| feature.parent == Parent::Tip && feature.xyz.is_some())
+    let cameras = rig.cameras.iter().any(|camera| camera.parent == Parent::Tip && camera.pose.is_some());
+    let features = rig.features.iter().any(|feature| feature.parent == Parent::Tip && feature.xyz.is_some());
+    setup.chain_is_known() && (cameras || features)
 }
 
 /// Something given is a length: of a link, between cameras, between features, or the reading of a sliding joint.
@@ -139,18 +142,17 @@ pub(crate) fn length_is_known(setup: &Setup) -> bool {
         || of_parent(Parent::Tip) >= 2
 }
 
-/// Moves the world so that the base is where it starts.
-fn move_world(state: &mut State) {
-    let base_from_world = state.model.base.inverse();
-    state.model.base = Pose::identity();
+/// Moves everything that is fixed to the world.
+pub(crate) fn move_world(state: &mut State, new_from_old: &Pose) {
+    state.model.base = *new_from_old * state.model.base;
     for camera in state.model.cameras.iter_mut().filter(|camera| camera.parent == Parent::World) {
-        camera.pose = base_from_world * camera.pose;
+        camera.pose = *new_from_old * camera.pose;
     }
     for feature in state.model.features.iter_mut().filter(|feature| feature.parent == Parent::World) {
-        feature.xyz = base_from_world.transform(&feature.xyz);
+        feature.xyz = new_from_old.transform(&feature.xyz);
     }
     for tip in &mut state.tips {
-        *tip = base_from_world * *tip;
+        *tip = *new_from_old * *tip;
     }
 }
 

@@ -73,6 +73,21 @@ impl Freedom {
     }
 }
 
+impl Freedom {
+    /// Everything held, end to end.
+    pub fn nothing(setup: &Setup) -> Freedom {
+        let all = Freedom::all(setup, true);
+        Freedom {
+            base: [true; 6],
+            parameters: vec![true; all.parameters.len()],
+            cameras: vec![[true; 6]; all.cameras.len()],
+            intrinsics: vec![[true; 12]; all.intrinsics.len()],
+            features: vec![[true; 3]; all.features.len()],
+            ..all
+        }
+    }
+}
+
 /// Builds the graph over the observations for which `takes_part` says so.
 pub(crate) fn build(
     setup: &Setup,

@@ -1,10 +1,10 @@
 //! From a recording to a first state of everything, without starting values (stages 1 to 3).
 use super::anchor::Anchor;
-use super::evaluate::median;
-use super::graph::{Freedom, Priors, State};
+use super::graph::{Freedom, State};
 use super::kinematics::{find_axes, find_lines, rows};
+use super::settle::settle;
 use super::setup::Setup;
-use super::stage::Stages;
+use super::stage::{Stage, Stages};
 use super::visual::{Scene, Sighting, Views, reconstruct};
 use super::{gauge, join};
 use crate::Error;
@@ -26,9 +26,13 @@ const LOOK: usize = 400;
 const THRESHOLD: f64 = 4.0;
 const THRESHOLD_PX: f64 = 2.0;
 
+/// Widths of Cauchy's loss while only cameras, structure and tips are fitted [standard deviations].
+const WIDTHS: [f64; 2] = [20.0, 3.0];
+
 /// Finds a first state.
-pub(crate) fn initialise(setup: &Setup, priors: &Priors, seed: u64, stages: &mut Stages<'_>) -> Result<State, Error> {
-    let seen = look(setup, priors, seed, stages)?;
+pub(crate) fn initialise(seed: u64, stages: &mut Stages<'_>) -> Result<State, Error> {
+    let setup = stages.setup;
+    let seen = look(seed, stages)?;
     let mut state = seen.state;
     let samples: Vec<usize> = (0..setup.joints.len()).filter(|&sample| seen.placed[sample]).collect();
     let tips: Vec<Pose> = samples.iter().map(|&sample| state.tips[sample]).collect();
@@ -44,14 +48,16 @@ pub(crate) fn initialise(setup: &Setup, priors: &Priors, seed: u64, stages: &mut
         })?;
         anchor.apply(&mut state);
     } else {
-        learn_chain(setup, &samples, &mut state, seed, stages)?;
+        learn_chain(&samples, &mut state, seed, stages)?;
     }
     join::join(setup, &mut state, &seen.cameras, &seen.features, seed)?;
+    settle(setup, &mut state);
     Ok(state)
 }
 
 /// Cameras, structure and tips from the images alone (eqs. 2 and 3).
-fn look(setup: &Setup, priors: &Priors, seed: u64, stages: &mut Stages<'_>) -> Result<Seen, Error> {
+fn look(seed: u64, stages: &mut Stages<'_>) -> Result<Seen, Error> {
+    let setup = stages.setup;
     let on_arm = cameras_are_on_the_arm(setup);
     let (mount, object) = if on_arm { (Parent::Tip, Parent::World) } else { (Parent::World, Parent::Tip) };
     let model = &setup.model;
@@ -88,22 +94,14 @@ fn look(setup: &Setup, priors: &Priors, seed: u64, stages: &mut Stages<'_>) -> R
             parents == (mount, object) && seen.placed[o.sample] && seen.cameras[o.camera] && seen.features[o.feature]
         };
         let count = (0..setup.observations.len()).filter(|&index| takes_part(index)).count();
-        let mut outcome = None;
-        for width in [20.0, 3.0] {
-            let report = stages.minimize(
-                "cameras and structure",
-                setup,
-                &mut seen.state,
-                &freedom,
-                priors,
-                Loss::Cauchy(width),
-                &takes_part,
-            )?;
-            outcome = Some(report.final_cost);
-        }
         // Missing observations are as bad as outliers.
-        let missing = (setup.observations.len() - count) as f64;
-        let cost = outcome.unwrap_or(f64::INFINITY) + 20.0 * missing;
+        let mut cost = 20.0 * (setup.observations.len() - count) as f64;
+        for width in WIDTHS {
+            let loss = Loss::Cauchy(width);
+            let stage = Stage { name: "cameras and structure", freedom: &freedom, loss, takes_part: &takes_part };
+            let report = stages.minimize(&stage, &mut seen.state)?;
+            cost += if width == WIDTHS[1] { report.final_cost } else { 0.0 };
+        }
         if best.as_ref().is_none_or(|best| cost < best.0) {
             best = Some((cost, seen));
         }
@@ -146,13 +144,8 @@ fn seen_from(setup: &Setup, scene: &Scene, on_arm: bool) -> Option<Seen> {
 }
 
 /// The chain from the seen tips (eq. 5), and everything that was seen moved to where it is.
-fn learn_chain(
-    setup: &Setup,
-    samples: &[usize],
-    state: &mut State,
-    seed: u64,
-    stages: &mut Stages<'_>,
-) -> Result<(), Error> {
+fn learn_chain(samples: &[usize], state: &mut State, seed: u64, stages: &mut Stages<'_>) -> Result<(), Error> {
+    let setup = stages.setup;
     let kinds = &setup.model.chain.kinds;
     let needed = kinds.len() + 2;
     if samples.len() < needed {
@@ -189,6 +182,7 @@ fn learn_chain(
     let at_zero = state.model.tip(&vec![0.0; kinds.len()]);
     let tip = at_zero.inverse() * lines.at_zero;
     Anchor { scale: 1.0, world: Pose::identity(), tip }.apply(state);
-    stages.record("kinematics", median(&mut axes.angles.clone()), started);
+    let angles = |angles: &[f64]| 0.5 * angles.iter().map(|angle| angle * angle).sum::<f64>();
+    stages.record("kinematics", axes.iterations, (angles(&axes.first_angles), angles(&axes.angles)), started);
     Ok(())
 }

@@ -21,20 +21,14 @@ pub(crate) fn join(
     let mut features = features.to_vec();
     let links: Vec<_> = setup.joints.iter().map(|joints| state.model.links(joints)).collect();
     loop {
-        let mut progress = false;
-        for feature in 0..features.len() {
-            if !features[feature] && place_feature(setup, state, &links, &cameras, feature) {
-                features[feature] = true;
-                progress = true;
-            }
+        let before = (cameras.clone(), features.clone());
+        for (feature, placed) in features.iter_mut().enumerate().filter(|(_, placed)| !**placed) {
+            *placed = place_feature(setup, state, &links, &cameras, feature);
         }
-        for camera in 0..cameras.len() {
-            if !cameras[camera] && place_camera(setup, state, &links, &features, camera, seed) {
-                cameras[camera] = true;
-                progress = true;
-            }
+        for (camera, placed) in cameras.iter_mut().enumerate().filter(|(_, placed)| !**placed) {
+            *placed = place_camera(setup, state, &links, &features, camera, seed);
         }
-        if !progress {
+        if before == (cameras.clone(), features.clone()) {
             break;
         }
     }

@@ -12,6 +12,7 @@ mod outliers;
 mod priors;
 mod report;
 mod robust;
+mod settle;
 mod setup;
 mod stage;
 mod visual;
@@ -22,11 +23,13 @@ pub use report::{Calibration, Finding, Report, StageReport, TipDeviation};
 use crate::Error;
 use crate::recording::Recording;
 use crate::rig::Rig;
+use deviations::deviations;
+use finish::finish;
 use graph::{Priors, State};
 use handeye_solvers::{Loss, Pose};
-use outliers::Verdict;
+use initialise::initialise;
 use setup::Setup;
-use stage::Stages;
+use stage::{Stage, Stages};
 use std::ops::ControlFlow;
 
 /// How to calibrate.
@@ -70,28 +73,22 @@ pub fn calibrate(
 ) -> Result<Calibration, Error> {
     let setup = Setup::new(rig, recording)?;
     let priors = Priors::new(&setup);
-    let mut stages = Stages { reports: Vec::new(), observer, cancelled: false };
+    let mut stages = Stages::new(&setup, &priors, observer);
     let mut state = if is_complete(&setup) {
         let tips = vec![Pose::identity(); setup.joints.len()];
         State { model: setup.model.clone(), tips }
     } else {
-        initialise::initialise(&setup, &priors, options.seed, &mut stages)?
+        initialise(options.seed, &mut stages)?
     };
     let (mut freedom, gauge) = gauge::end_to_end(&setup, &mut state, &priors);
-    let mut verdict = Verdict::all(&setup);
-    robust::fit(&setup, &mut state, &freedom, &priors, &mut stages, &mut verdict)?;
-    let report =
-        stages.minimize("end to end", &setup, &mut state, &freedom, &priors, Loss::Cauchy(TAILS), |index| {
-            verdict.active[index]
-        })?;
-    robust::hold_moved(&mut freedom, &verdict);
-    robust::place_moved(&setup, &mut state, &freedom, &priors, &mut stages, &verdict)?;
-    let converged = report.termination.converged();
-    let unseen = setup.unseen.iter().map(|camera| Finding::UnseenCamera { camera: camera.clone() });
-    verdict.findings.splice(0..0, unseen);
-    let built = graph::build(&setup, &state, &freedom, &priors, Loss::Cauchy(TAILS), |index| verdict.active[index]);
-    let deviations = deviations::deviations(&setup, &state, &freedom, &verdict, &built);
-    Ok(finish::finish(&setup, &state, verdict, stages.reports, converged, gauge, deviations))
+    let verdict = robust::fit(&mut state, &freedom, &mut stages)?;
+    robust::place_moved(&mut state, &mut freedom, &verdict, &mut stages)?;
+    let takes_part = |index: usize| verdict.active[index];
+    let last = Stage { name: "end to end", freedom: &freedom, loss: Loss::Cauchy(TAILS), takes_part: &takes_part };
+    let converged = stages.minimize(&last, &mut state)?.termination.converged();
+    let deviations = deviations(&setup, &state, &freedom, &verdict, &stages.build(&last, &state));
+    let reports = std::mem::take(&mut stages.reports);
+    Ok(finish(&setup, &state, verdict, reports, converged, gauge, deviations))
 }
 
 /// Width of Cauchy's loss in the last stage [standard deviations]. Real errors have heavier tails than a Gaussian; on Gaussian

@@ -2,7 +2,7 @@
 use super::deviations::coordinate_of;
 use super::graph::{Priors, row};
 use super::setup::Setup;
-use crate::rig::{CameraField, JointField, Parameter};
+use crate::rig::{CameraField, JointField, Parameter, Parent};
 
 /// Where a value is given and nothing is said of how well, it is weakly known: so far off a value from a data sheet or an
 /// earlier calibration may well be.
@@ -30,6 +30,8 @@ impl Priors {
             intrinsics: vec![[f64::INFINITY; 12]; model.cameras.len()],
             features: vec![[f64::INFINITY; 3]; model.features.len()],
         };
+        // Given places on the tip or a link mean nothing against the frames of an unknown chain; their distances do.
+        let floats = |parent: Parent| parent != Parent::World && !setup.chain_is_known();
         for parameter in rig.parameters() {
             let stated = rig.prior_sd(&parameter);
             // A stated prior needs a value to be around; intrinsics always have one.
@@ -41,7 +43,9 @@ impl Priors {
                     let is_length = matches!(field, JointField::D | JointField::A);
                     priors.parameters[row(joint) + coordinate_of(field)] = sd(if is_length { LENGTH } else { ANGLE });
                 }
-                Parameter::CameraPose(camera) => priors.cameras[camera] = pose(sd(CAMERA_ANGLE), sd(CAMERA_LENGTH)),
+                Parameter::CameraPose(camera) if !floats(rig.cameras[camera].parent) => {
+                    priors.cameras[camera] = pose(sd(CAMERA_ANGLE), sd(CAMERA_LENGTH));
+                }
                 Parameter::CameraField { camera, field } => {
                     let known = setup.intrinsics[camera];
                     let k = &model.cameras[camera].intrinsics;
@@ -58,7 +62,10 @@ impl Priors {
                         CameraField::Distortion => sigmas[4..].fill(stated.unwrap_or(distortion)),
                     }
                 }
-                Parameter::FeatureXyz(feature) => priors.features[feature] = [sd(LENGTH); 3],
+                Parameter::FeatureXyz(feature) if !floats(rig.features[feature].parent) => {
+                    priors.features[feature] = [sd(LENGTH); 3];
+                }
+                Parameter::CameraPose(_) | Parameter::FeatureXyz(_) => {}
             }
         }
         priors

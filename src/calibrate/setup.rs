@@ -3,7 +3,7 @@ use crate::Error;
 use crate::camera::{CameraModel, PARAMETERS};
 use crate::chain::LINK_PARAMETERS;
 use crate::recording::{RecordedCamera, Recording};
-use crate::rig::{Camera, Feature, Joint, Model, ModelCamera, ModelFeature, Parent, Rig};
+use crate::rig::{Camera, Feature, Joint, Model, ModelCamera, ModelFeature, Parameter, Parent, Rig};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
 use std::collections::BTreeSet;
@@ -203,13 +203,30 @@ fn seen_size(camera: &Camera, recording: &Recording) -> Option<[f64; 2]> {
         .map(|most| most.map(|x| x.max(1.0) + 1.0))
 }
 
+fn is_chain_known(rig: &Rig) -> bool {
+    let known = |joint: &Joint| [joint.offset, joint.d, joint.a, joint.alpha].iter().all(Option::is_some);
+    rig.robot.joints.iter().all(known)
+}
+
 /// Every parameter that is held must have a value (a base that is left out is the identity).
 fn check_held(rig: &Rig) -> Result<(), Error> {
     for parameter in rig.parameters() {
-        let base = parameter == crate::rig::Parameter::Base;
+        let base = parameter == Parameter::Base;
         if rig.is_fixed(&parameter) && !base && !rig.has_value(&parameter) {
             return Err(Error::Unusable(format!(
                 "`{}` is held by [estimate] fixed but has no value: give it one, or leave it free",
+                parameter.path(rig)
+            )));
+        }
+        let parent = match parameter {
+            Parameter::CameraPose(camera) => rig.cameras[camera].parent,
+            Parameter::FeatureXyz(feature) => rig.features[feature].parent,
+            _ => Parent::World,
+        };
+        if rig.is_fixed(&parameter) && parent != Parent::World && !is_chain_known(rig) {
+            return Err(Error::Unusable(format!(
+                "`{}` is held in the frame of a chain that is not known: give every row of [[robot.joints]], or leave it free \
+                 (what is given still sets the scale)",
                 parameter.path(rig)
             )));
         }

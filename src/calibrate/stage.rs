@@ -1,70 +1,71 @@
-//! Runs one stage and keeps count of it.
-use super::graph::{Freedom, Priors, State, build};
+//! Stages of a calibration as data, and the one way to run them.
+use super::graph::{Built, Freedom, Priors, State, build};
 use super::setup::Setup;
 use super::{Observer, Progress, StageReport};
 use crate::Error;
-use handeye_solvers::{LevenbergMarquardt, Loss, Report, Solver};
+use handeye_solvers::{LevenbergMarquardt, Loss, Report, Solver, Termination};
 use std::time::Instant;
 
-/// The stages so far, and who watches them.
+/// What one stage minimises: which numbers are free, which observations take part, and how much a large error pulls.
+pub(crate) struct Stage<'a> {
+    pub name: &'a str,
+    pub freedom: &'a Freedom,
+    pub loss: Loss,
+    pub takes_part: &'a dyn Fn(usize) -> bool,
+}
+
+/// A calibration on its way: what is given, the stages so far, and who watches them.
 pub(crate) struct Stages<'a> {
+    pub setup: &'a Setup,
+    pub priors: &'a Priors,
     pub reports: Vec<StageReport>,
     pub observer: Observer<'a>,
-    pub cancelled: bool,
 }
 
 /// Most iterations of a stage.
 const ITERATIONS: usize = 200;
 
-impl Stages<'_> {
-    /// Minimises over what is free, and moves the state there.
-    #[allow(clippy::too_many_arguments)]
-    pub fn minimize(
-        &mut self,
-        name: &str,
-        setup: &Setup,
-        state: &mut State,
-        freedom: &Freedom,
-        priors: &Priors,
-        loss: Loss,
-        takes_part: impl Fn(usize) -> bool,
-    ) -> Result<Report, Error> {
+impl<'a> Stages<'a> {
+    pub fn new(setup: &'a Setup, priors: &'a Priors, observer: Observer<'a>) -> Self {
+        Stages { setup, priors, reports: Vec::new(), observer }
+    }
+
+    /// The graph of a stage at a state.
+    pub fn build(&self, stage: &Stage<'_>, state: &State) -> Built {
+        build(self.setup, state, stage.freedom, self.priors, stage.loss, stage.takes_part)
+    }
+
+    /// Minimises, and moves the state there.
+    pub fn minimize(&mut self, stage: &Stage<'_>, state: &mut State) -> Result<Report, Error> {
         let started = Instant::now();
-        let mut built = build(setup, state, freedom, priors, loss, takes_part);
-        let pixels = setup.sigma() * (2.0 / built.factors.len().max(1) as f64).sqrt();
+        let mut built = self.build(stage, state);
+        let pixels = self.setup.sigma() * (2.0 / built.factors.len().max(1) as f64).sqrt();
         let mut solver = Solver::new(&built.graph);
         let minimizer = LevenbergMarquardt { max_iterations: ITERATIONS, ..Default::default() };
         let observer = &mut self.observer;
         let report = minimizer.minimize_with(&mut built.graph, &mut solver, &mut |iteration| {
             observer(&Progress {
-                stage: name,
+                stage: stage.name,
                 done: iteration.number,
                 of: ITERATIONS,
                 rms_px: Some(pixels * iteration.cost.sqrt()),
             })
         })?;
-        built.read(state);
-        self.cancelled |= report.termination == handeye_solvers::Termination::Cancelled;
-        if self.cancelled {
-            return Err(Error::NotEnoughData("cancelled".into()));
+        if report.termination == Termination::Cancelled {
+            return Err(Error::Cancelled);
         }
-        self.reports.push(StageReport {
-            name: name.to_owned(),
-            iterations: report.iterations,
-            loss_before: report.initial_cost,
-            loss_after: report.final_cost,
-            seconds: started.elapsed().as_secs_f64(),
-        });
+        built.read(state);
+        self.record(stage.name, report.iterations, (report.initial_cost, report.final_cost), started);
         Ok(report)
     }
 
-    /// Notes a stage that was no minimisation of the graph.
-    pub fn record(&mut self, name: &str, loss_after: f64, started: Instant) {
+    /// Notes a stage, with its loss before and after.
+    pub fn record(&mut self, name: &str, iterations: usize, (before, after): (f64, f64), started: Instant) {
         self.reports.push(StageReport {
             name: name.to_owned(),
-            iterations: 0,
-            loss_before: f64::NAN,
-            loss_after,
+            iterations,
+            loss_before: before,
+            loss_after: after,
             seconds: started.elapsed().as_secs_f64(),
         });
     }

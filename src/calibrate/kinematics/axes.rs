@@ -18,6 +18,9 @@ pub(crate) struct Axes {
     pub cost: f64,
     /// Angle to each given rotation [rad].
     pub angles: Vec<f64>,
+    /// The same at the random start, and iterations from there.
+    pub first_angles: Vec<f64>,
+    pub iterations: usize,
 }
 
 /// Random starts per wave, fixed so that the outcome does not depend on the number of threads; and waves at most.
@@ -86,7 +89,14 @@ impl Problem<'_> {
         let mut normal = || Vector3::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal)).normalize();
         let directions: Vec<Vector3<f64>> = self.kinds.iter().map(|_| normal()).collect();
         let turned = self.turn(&directions, self.joints[0]);
-        Axes { directions, at_zero: turned.transpose() * self.rotations[0], cost: f64::INFINITY, angles: Vec::new() }
+        Axes {
+            directions,
+            at_zero: turned.transpose() * self.rotations[0],
+            cost: f64::INFINITY,
+            angles: Vec::new(),
+            first_angles: Vec::new(),
+            iterations: 0,
+        }
     }
 
     /// exp(w₁ j₁) ⋯ exp(wₙ jₙ).
@@ -101,6 +111,9 @@ impl Problem<'_> {
         let n = 3 * self.kinds.len() + 3;
         let mut best = start;
         (best.cost, best.angles) = self.cost(&best, width);
+        if best.first_angles.is_empty() {
+            best.first_angles.clone_from(&best.angles);
+        }
         let (mut h, mut b) = (DMatrix::zeros(n, n), DVector::zeros(n));
         self.linearize(&best, width, &mut h, &mut b);
         let mut lambda = 1e-3;
@@ -111,6 +124,7 @@ impl Problem<'_> {
             }
             let Some(factor) = damped.cholesky() else { break };
             let step = -factor.solve(&b);
+            best.iterations += 1;
             let mut trial = best.clone();
             for (i, direction) in trial.directions.iter_mut().enumerate() {
                 let w = step.fixed_rows::<3>(3 * i).into_owned();
