@@ -1,10 +1,10 @@
 //! How well the learned numbers are determined: standard deviations, the tip's in metres, and what only a prior decides.
-use super::TipDeviation;
 use super::evaluate::median;
-use super::gauge::length_is_known;
 use super::graph::{Built, Freedom, row};
 use super::outliers::{Verdict, distances};
 use super::setup::Setup;
+use super::stage::{Stage, Stages};
+use super::{TipDeviation, gauge};
 use crate::calibrate::graph::State;
 use crate::rig::{CameraField, JointField, Parameter};
 use handeye_solvers::{Covariance, Solver, WeakDirection, Weakness};
@@ -28,38 +28,44 @@ const TIPS: usize = 200;
 const DIRECTIONS: usize = 6;
 const NAMED: usize = 4;
 
-/// Deviations at the final state, by the linearised problem. Where the residuals are larger than the stated noise explains,
-/// all deviations are larger by that factor.
-pub(crate) fn deviations(
-    setup: &Setup,
-    state: &State,
-    freedom: &Freedom,
-    verdict: &Verdict,
-    built: &Built,
-) -> Deviations {
+/// Deviations at the final state of a stage, by the linearised problem. Where the residuals are larger than the stated noise
+/// explains, all deviations are larger by that factor.
+pub(crate) fn deviations(stages: &Stages<'_>, last: &Stage<'_>, state: &State, verdict: &Verdict) -> Deviations {
+    let setup = stages.setup;
     let mut deviations = Deviations::default();
+    let built = stages.build(last, state);
     let mut solver = Solver::new(&built.graph);
     if let Ok(found) = WeakDirection::find(&built.graph, &mut solver, None) {
-        deviations.weak = found.iter().take(DIRECTIONS).map(|weak| words(setup, built, weak)).collect();
+        deviations.weak = found.iter().take(DIRECTIONS).map(|weak| words(setup, &built, weak)).collect();
         if found.len() > DIRECTIONS {
             deviations.weak.push(format!("and {} combinations more like these", found.len() - DIRECTIONS));
         }
     }
-    let Ok(mut covariance) = Covariance::with(&built.graph, solver) else { return deviations };
     let factor = scatter(setup, state, verdict).max(1.0);
-    deviations.by_path = by_path(setup, freedom, built, &mut covariance, factor);
+    if let Ok(mut covariance) = Covariance::with(&built.graph, solver) {
+        deviations.by_path = by_path(setup, last.freedom, &built, &mut covariance, factor);
+        deviations.tip = tip(stages, last, state, factor);
+    }
+    deviations
+}
+
+/// Deviation of the tip's position, root of the trace of its covariance, over the samples.
+///
+/// The base and the tip's frame are taken as they are: where only a prior says how the base lies against the first axis, or
+/// the tip's frame against the features, nothing that is seen depends on it.
+fn tip(stages: &Stages<'_>, last: &Stage<'_>, state: &State, factor: f64) -> Option<TipDeviation> {
+    let freedom = gauge::with_frames_held(stages.setup, last.freedom);
+    let built = stages.build(&Stage { freedom: &freedom, ..*last }, state);
+    let mut covariance = Covariance::new(&built.graph).ok()?;
     let tips: Vec<_> = built.tips.iter().flatten().copied().collect();
     let every = tips.len().div_ceil(TIPS).max(1);
-    let mut of_tip = |tip| {
+    let deviation = |tip| {
         let block = covariance.of(tip);
         factor * (block[(3, 3)] + block[(4, 4)] + block[(5, 5)]).max(0.0).sqrt()
     };
-    let mut sds: Vec<f64> = tips.into_iter().step_by(every).map(&mut of_tip).collect();
-    let largest = sds.iter().copied().fold(0.0, f64::max);
-    if !sds.is_empty() {
-        deviations.tip = Some(TipDeviation { median: median(&mut sds), largest, metric: length_is_known(setup) });
-    }
-    deviations
+    let mut sds: Vec<f64> = tips.into_iter().step_by(every).map(deviation).collect();
+    let largest = sds.iter().copied().reduce(f64::max)?;
+    Some(TipDeviation { median: median(&mut sds), largest, metric: gauge::length_is_known(stages.setup) })
 }
 
 /// Root of the mean square of a coordinate's error over the stated noise.
@@ -144,7 +150,8 @@ fn words(setup: &Setup, built: &Built, weak: &WeakDirection) -> String {
     let others = if others > 0 { format!(" and {others} more") } else { String::new() };
     let what = match weak.kind {
         Weakness::Open => "nothing determines".to_owned(),
-        Weakness::Prior => format!("a prior more than the data ({:.1} to 1) determines", weak.sd_ratio.min(9999.0)),
+        Weakness::Prior if weak.sd_ratio > 1e3 => "only a prior determines".to_owned(),
+        Weakness::Prior => format!("a prior more than the data ({:.1} to 1) determines", weak.sd_ratio),
     };
     let kind = if weak.components.len() == 1 { "" } else { "a combination of " };
     format!("{what} {kind}{}{others}", names.join(", "))

@@ -42,11 +42,12 @@ pub(crate) fn end_to_end(setup: &Setup, state: &mut State, priors: &Priors) -> (
         }
     };
     let convention = rig.robot.convention;
-    let first: &[usize] = if convention == Convention::ModifiedDh { &[0, 1, 2, 3] } else { &[0, 1] };
-    hold(0, first, "the base can turn about and slide along the first axis", &mut words, &mut freedom);
+    let (first_redundant, last_redundant) = ends(convention);
+    let why = "the base can turn about and slide along the first axis";
+    hold(0, first_redundant, why, &mut words, &mut freedom);
     if !tip_is_known(setup) {
-        let redundant: &[usize] = if convention == Convention::ModifiedDh { &[0, 1] } else { &[0, 1, 2, 3] };
-        hold(last, redundant, "the tip's frame can move against what is fixed to it", &mut words, &mut freedom);
+        let why = "the tip's frame can move against what is fixed to it";
+        hold(last, last_redundant, why, &mut words, &mut freedom);
     }
     for (joint, given) in joints.iter().enumerate().skip(1) {
         if given.kind == JointKind::Prismatic {
@@ -85,6 +86,28 @@ pub(crate) fn end_to_end(setup: &Setup, state: &mut State, priors: &Priors) -> (
         }
     }
     (freedom, words)
+}
+
+/// The same with the frames of base and tip held against the first axis and against what is fixed to the tip.
+pub(crate) fn with_frames_held(setup: &Setup, freedom: &Freedom) -> Freedom {
+    let mut freedom = freedom.clone();
+    let (first, last) = ends(setup.rig.robot.convention);
+    for &coordinate in first {
+        freedom.parameters[coordinate] = true;
+    }
+    if !tip_is_known(setup) {
+        let joint = setup.rig.robot.joints.len() - 1;
+        last.iter().for_each(|coordinate| freedom.parameters[row(joint) + coordinate] = true);
+    }
+    freedom
+}
+
+/// Numbers of the first row that the base's place makes redundant, and of the last that the tip's frame does.
+fn ends(convention: Convention) -> (&'static [usize], &'static [usize]) {
+    match convention {
+        Convention::Dh => (&[0, 1], &[0, 1, 2, 3]),
+        Convention::ModifiedDh => (&[0, 1, 2, 3], &[0, 1]),
+    }
 }
 
 /// Holds what the rig says is held.

@@ -86,7 +86,7 @@ pub fn calibrate(
     let takes_part = |index: usize| verdict.active[index];
     let last = Stage { name: "end to end", freedom: &freedom, loss: Loss::Cauchy(TAILS), takes_part: &takes_part };
     let converged = stages.minimize(&last, &mut state)?.termination.converged();
-    let deviations = deviations(&setup, &state, &freedom, &verdict, &stages.build(&last, &state));
+    let deviations = deviations(&stages, &last, &state, &verdict);
     let reports = std::mem::take(&mut stages.reports);
     Ok(finish(&setup, &state, verdict, reports, converged, gauge, deviations))
 }
