@@ -37,6 +37,12 @@ const DETECTION: f64 = 10.0;
 /// An image belongs to another pose where its median is beyond this many: less may be a robot that does not repeat itself.
 const IMAGE: f64 = 10.0;
 
+/// Detections that an image must have to be judged as a whole.
+const IN_IMAGE: usize = 3;
+
+/// Samples with wrong joints among which swapped pairs are looked for, at most.
+const SWAPPED: usize = 40;
+
 /// Images count as shifted where the squares of their mean errors are this many times what noise explains.
 const SHIFTED: f64 = 4.0;
 
@@ -57,8 +63,11 @@ pub(crate) fn judge(setup: &Setup, state: &State, left_out: &[bool], moved: &[bo
     for (seen, distance) in setup.observations.iter().zip(&distances) {
         images.entry((seen.sample, seen.camera)).or_default().push(*distance);
     }
-    let medians: BTreeMap<(usize, usize), f64> =
-        images.into_iter().map(|(key, mut distances)| (key, median(&mut distances))).collect();
+    let medians: BTreeMap<(usize, usize), f64> = images
+        .into_iter()
+        .filter(|(_, distances)| distances.len() >= IN_IMAGE)
+        .map(|(key, mut distances)| (key, median(&mut distances)))
+        .collect();
     let bad = |key: &(usize, usize)| medians.get(key).is_some_and(|median| *median > IMAGE * sigma);
     let of_sample = |sample: usize| medians.range((sample, 0)..=(sample, usize::MAX)).map(|(key, _)| *key);
 
@@ -129,7 +138,7 @@ pub(crate) fn moved_camera(setup: &Setup, state: &State, verdict: &Verdict) -> O
         usual_distance(&|other| other == camera) / others.max(MEDIAN_DISTANCE * setup.sigma())
     };
     let shift = |camera: usize| {
-        let of_camera = images.iter().filter(|(key, errors)| key.0 == camera && errors.len() >= 4);
+        let of_camera = images.iter().filter(|(key, errors)| key.0 == camera && errors.len() >= IN_IMAGE);
         median(&mut of_camera.map(|(_, errors)| shift(errors)).collect::<Vec<_>>())
     };
     let still = (0..verdict.moved.len()).filter(|&camera| !verdict.moved[camera]);
@@ -157,13 +166,14 @@ fn report(
 ) {
     let name = |sample: usize| setup.samples[sample];
     for &sample in wrong_joints {
+        // Both ways round.
         let fits = |other: &&usize| {
             **other != sample
                 && median_with_joints_of(setup, state, &verdict.moved, sample, **other) < 2.0 * IMAGE * sigma
                 && median_with_joints_of(setup, state, &verdict.moved, **other, sample) < 2.0 * IMAGE * sigma
         };
         let median_px = median_with_joints_of(setup, state, &verdict.moved, sample, sample);
-        let swapped_with = wrong_joints.iter().find(fits).map(|&other| name(other));
+        let swapped_with = wrong_joints.iter().take(SWAPPED).find(fits).map(|&other| name(other));
         verdict.findings.push(Finding::WrongJoints { sample: name(sample), median_px, swapped_with });
     }
     for &(sample, camera) in wrong_images {

@@ -1,6 +1,8 @@
 //! The end-to-end fit among wrong data: fit with a loss that lets go of outliers, judge, leave out, and again.
+use super::Finding;
 use super::graph::{Freedom, State};
 use super::outliers::{Verdict, judge, moved_camera};
+use super::setup::Setup;
 use super::stage::{Stage, Stages};
 use crate::Error;
 use handeye_solvers::Loss;
@@ -26,6 +28,7 @@ pub(crate) fn fit(state: &mut State, freedom: &Freedom, stages: &mut Stages<'_>)
         let before = std::mem::take(&mut verdict.left_out);
         verdict = judge(setup, state, &before, &verdict.moved);
         if verdict.left_out != before {
+            check_rest(setup, &verdict)?;
             continue;
         }
         let Some(camera) = moved_camera(setup, state, &verdict) else { break };
@@ -33,6 +36,19 @@ pub(crate) fn fit(state: &mut State, freedom: &Freedom, stages: &mut Stages<'_>)
         verdict = judge(setup, state, &before, &verdict.moved);
     }
     Ok(verdict)
+}
+
+/// Where most samples do not fit, something is wrong with all of them.
+fn check_rest(setup: &Setup, verdict: &Verdict) -> Result<(), Error> {
+    let wrong = verdict.findings.iter().filter(|finding| matches!(finding, Finding::WrongJoints { .. })).count();
+    if 2 * wrong <= setup.joints.len() {
+        return Ok(());
+    }
+    Err(Error::NotEnoughData(format!(
+        "the joints of {wrong} of {} samples do not lead to what the cameras saw: check that readings and images are of the \
+         same moments, and the order, units and kinds of the joints",
+        setup.joints.len()
+    )))
 }
 
 /// Puts cameras that moved where they were for most of the recording, with everything else held, and holds them: they say
