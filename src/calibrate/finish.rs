@@ -9,6 +9,9 @@ use crate::camera::CameraModel;
 use crate::rig::{Fit, Rig};
 use handeye_solvers::Pose;
 
+/// Errors are told of where they are this many times the stated noise.
+const MISFIT: f64 = 3.0;
+
 /// Puts everything together.
 pub(crate) fn finish(
     setup: &Setup,
@@ -60,6 +63,8 @@ pub(crate) fn finish(
         sd: deviations.by_path,
     });
     let unseen = setup.unseen.iter().map(|camera| Finding::UnseenCamera { camera: camera.clone() });
+    let ratio = total.rms_px / (2.0_f64.sqrt() * setup.sigma());
+    let misfit = (ratio > MISFIT).then_some(Finding::Misfit { ratio, stated_px: setup.sigma() });
     let report = Report {
         samples,
         observations: total.observations,
@@ -71,7 +76,7 @@ pub(crate) fn finish(
         stages,
         converged,
         gauge,
-        findings: unseen.chain(verdict.findings).collect(),
+        findings: misfit.into_iter().chain(unseen).chain(verdict.findings).collect(),
         tip: deviations.tip,
     };
     Calibration { rig, report }

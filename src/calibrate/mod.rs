@@ -8,6 +8,7 @@ mod graph;
 mod initialise;
 mod join;
 mod kinematics;
+mod look;
 mod outliers;
 mod priors;
 mod report;

@@ -63,6 +63,13 @@ pub enum Finding {
         /// Its name.
         camera: String,
     },
+    /// All errors together are far larger than the stated noise: the model leaves something out.
+    Misfit {
+        /// Root mean square error of a coordinate over its stated standard deviation.
+        ratio: f64,
+        /// Stated standard deviation of a coordinate [px].
+        stated_px: f64,
+    },
     /// Single detections were left out.
     Outliers {
         /// How many.
@@ -103,6 +110,11 @@ impl std::fmt::Display for Finding {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Finding::UnseenCamera { camera } => write!(f, "camera `{camera}` saw nothing and was left out"),
+            Finding::Misfit { ratio, stated_px } => write!(
+                f,
+                "errors are {ratio:.1} times the stated noise of {stated_px} px: the noise is larger, a lens model or a joint's kind \
+                 is wrong, or the fit went astray"
+            ),
             Finding::Outliers { count, of } => write!(f, "{count} of {of} detections do not fit and were left out"),
             Finding::WrongJoints { sample, median_px, swapped_with } => {
                 write!(f, "sample {sample}: its joints do not lead to what the cameras saw ({median_px:.1} px)")?;

@@ -168,6 +168,7 @@ pub fn report_json(report: &Report) -> Value {
 fn finding_json(finding: &Finding) -> Value {
     let mut json = match finding {
         Finding::UnseenCamera { camera } => json!({ "kind": "unseen_camera", "camera": camera }),
+        Finding::Misfit { ratio, stated_px } => json!({ "kind": "misfit", "ratio": ratio, "stated_px": stated_px }),
         Finding::Outliers { count, of } => json!({ "kind": "outliers", "count": count, "of": of }),
         Finding::WrongJoints { sample, median_px, swapped_with } => {
             json!({ "kind": "wrong_joints", "sample": sample, "median_px": median_px, "swapped_with": swapped_with })

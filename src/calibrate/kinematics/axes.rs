@@ -25,7 +25,7 @@ pub(crate) struct Axes {
 
 /// Random starts per wave, fixed so that the outcome does not depend on the number of threads; and waves at most.
 const WAVE: usize = 32;
-const WAVES: usize = 24;
+const WAVES: usize = 12;
 
 /// Iterations of a start that is only looked at, and of one that is followed to the end.
 const GLANCE: usize = 12;
