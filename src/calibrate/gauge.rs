@@ -7,85 +7,133 @@ use super::deviations::{coordinate_of, intrinsics_of};
 use super::graph::{Freedom, Priors, State, row};
 use super::kinematics::PARALLEL;
 use super::setup::Setup;
-use crate::chain::{Convention, JointKind};
+use crate::chain::{Convention, JointKind, LINK_PARAMETERS};
 use crate::rig::{JointField, Parameter, Parent};
 use handeye_solvers::Pose;
 
 /// What is free in the last stage, and the rules that were needed, in words.
 pub(crate) fn end_to_end(setup: &Setup, state: &mut State, priors: &Priors) -> (Freedom, Vec<String>) {
-    let mut freedom = Freedom::all(setup, true);
-    hold_fixed(setup, &mut freedom);
-    let mut words = Vec::new();
-    let rig = &setup.rig;
-    let joints = &rig.robot.joints;
-    if !freedom.base[0] && rig.robot.base.is_none() && !world_is_known(setup) {
-        freedom.base = [true; 6];
+    let mut rules = Rules { setup, priors, freedom: Freedom::all(setup, true), words: Vec::new() };
+    hold_fixed(setup, &mut rules.freedom);
+    rules.world(state);
+    rules.first_and_last_row();
+    rules.sliding_axes();
+    rules.parallel_axes(state);
+    rules.scale(state);
+    (rules.freedom, rules.words)
+}
+
+/// The rules so far.
+struct Rules<'a> {
+    setup: &'a Setup,
+    priors: &'a Priors,
+    freedom: Freedom,
+    words: Vec<String>,
+}
+
+/// A joint's numbers, in order.
+const NAMES: [&str; LINK_PARAMETERS] = ["offset", "d", "a", "alpha", "beta"];
+
+impl Rules<'_> {
+    fn world(&mut self, state: &mut State) {
+        if self.freedom.base[0] || self.setup.rig.robot.base.is_some() || world_is_known(self.setup) {
+            return;
+        }
+        self.freedom.base = [true; 6];
         let base_from_world = state.model.base.inverse();
         move_world(state, &base_from_world);
         state.model.base = Pose::identity();
-        words.push("the world frame is the robot's base: nothing that is known places the world".to_owned());
+        self.words.push("the world frame is the robot's base: nothing that is known places the world".to_owned());
     }
-    let unknown = |joint: usize, coordinate: usize| priors.parameters[row(joint) + coordinate].is_infinite();
-    let names = ["offset", "d", "a", "alpha", "beta"];
-    let last = joints.len() - 1;
-    let hold = |joint: usize, coordinates: &[usize], why: &str, words: &mut Vec<String>, freedom: &mut Freedom| {
-        let held: Vec<&str> = coordinates
-            .iter()
-            .filter(|&&coordinate| unknown(joint, coordinate) && !freedom.parameters[row(joint) + coordinate])
-            .map(|&coordinate| names[coordinate])
-            .collect();
-        for &coordinate in coordinates.iter().filter(|&&coordinate| unknown(joint, coordinate)) {
-            freedom.parameters[row(joint) + coordinate] = true;
-        }
-        if !held.is_empty() {
-            words.push(format!("{} of joint `{}` is held: {why}", held.join(", "), joints[joint].name));
-        }
-    };
-    let convention = rig.robot.convention;
-    let (first_redundant, last_redundant) = ends(convention);
-    let why = "the base can turn about and slide along the first axis";
-    hold(0, first_redundant, why, &mut words, &mut freedom);
-    if !tip_is_known(setup) {
-        let why = "the tip's frame can move against what is fixed to it";
-        hold(last, last_redundant, why, &mut words, &mut freedom);
-    }
-    for (joint, given) in joints.iter().enumerate().skip(1) {
-        if given.kind == JointKind::Prismatic {
-            let a_row = if convention == Convention::ModifiedDh { joint } else { joint - 1 };
-            hold(joint - 1, &[1], "a sliding axis has a direction but no place", &mut words, &mut freedom);
-            hold(a_row, &[2], "a sliding axis has a direction but no place", &mut words, &mut freedom);
+
+    fn first_and_last_row(&mut self) {
+        let (first, last) = ends(self.setup.rig.robot.convention);
+        self.hold(0, first, "the base can turn about and slide along the first axis");
+        if !tip_is_known(self.setup) {
+            self.hold(self.last(), last, "the tip's frame can move against what is fixed to it");
         }
     }
-    for joint in 0..joints.len() {
-        // The row that holds the angle between the axes of this joint and the next.
-        let twist = if convention == Convention::ModifiedDh { joint + 1 } else { joint };
-        let parallel = joint < last && state.model.parameters[row(twist) + 3].sin().abs() < PARALLEL;
-        // With a given d, the given rows stand as they are: a beta comes in only where the file has one.
-        if parallel && unknown(joint, 1) && joints[twist].beta.is_none() && !is_alpha_fixed(setup, twist) {
-            let why = "its axis is nearly parallel to the next, and beta stands in for d";
-            hold(joint, &[1], why, &mut words, &mut freedom);
-        } else if joint < last && joints[twist].beta.is_none() {
-            freedom.parameters[row(twist) + 4] = true;
+
+    fn sliding_axes(&mut self) {
+        for (joint, given) in self.setup.rig.robot.joints.iter().enumerate().skip(1) {
+            if given.kind == JointKind::Prismatic {
+                let why = "a sliding axis has a direction but no place";
+                self.hold(joint - 1, &[1], why);
+                self.hold(self.twist(joint - 1), &[2], why);
+            }
         }
     }
-    let ends = if convention == Convention::ModifiedDh { 0 } else { last };
-    freedom.parameters[row(ends) + 4] |= joints[ends].beta.is_none();
-    if !length_is_known(setup) {
+
+    /// Between nearly parallel axes, the place of the common normal along the first is ill-defined: beta stands in for d.
+    fn parallel_axes(&mut self, state: &State) {
+        let joints = &self.setup.rig.robot.joints;
+        for joint in 0..self.last() {
+            let twist = self.twist(joint);
+            if joints[twist].beta.is_some() {
+                continue;
+            }
+            let parallel = state.model.parameters[row(twist) + 3].sin().abs() < PARALLEL;
+            // With a given d, the given rows stand as they are: a beta comes in only where the file has one.
+            if parallel && self.is_unknown(joint, 1) && !is_alpha_fixed(self.setup, twist) {
+                self.hold(joint, &[1], "its axis is nearly parallel to the next, and beta stands in for d");
+            } else {
+                self.freedom.parameters[row(twist) + 4] = true;
+            }
+        }
+        // The row that no two axes share.
+        let end = if self.setup.rig.robot.convention == Convention::ModifiedDh { 0 } else { self.last() };
+        self.freedom.parameters[row(end) + 4] |= joints[end].beta.is_none();
+    }
+
+    fn scale(&mut self, state: &mut State) {
+        if length_is_known(self.setup) {
+            return;
+        }
+        let joints = &self.setup.rig.robot.joints;
         let lengths = (0..joints.len()).flat_map(|joint| [row(joint) + 1, row(joint) + 2]);
         let size = |&index: &usize| state.model.parameters[index].abs();
-        let longest = lengths.filter(|&index| !freedom.parameters[index]).max_by(|a, b| size(a).total_cmp(&size(b)));
-        if let Some(longest) = longest {
-            let unit = state.model.parameters[longest].abs();
-            rescale(state, 1.0 / unit);
-            freedom.parameters[longest] = true;
-            let (joint, name) = (longest / row(1), names[longest % row(1)]);
-            words.push(format!(
-                "lengths are in units of {name} of joint `{}`: nothing that is known is metric",
-                joints[joint].name
-            ));
+        let free = lengths.filter(|&index| !self.freedom.parameters[index]);
+        let Some(longest) = free.max_by(|a, b| size(a).total_cmp(&size(b))) else { return };
+        let unit = state.model.parameters[longest].abs();
+        rescale(state, 1.0 / unit);
+        self.freedom.parameters[longest] = true;
+        let (joint, name) = (longest / LINK_PARAMETERS, NAMES[longest % LINK_PARAMETERS]);
+        self.words.push(format!(
+            "lengths are in units of {name} of joint `{}`: nothing that is known is metric",
+            joints[joint].name
+        ));
+    }
+
+    /// Holds those of a joint's numbers of which nothing is known.
+    fn hold(&mut self, joint: usize, coordinates: &[usize], why: &str) {
+        let mut names = Vec::new();
+        for &coordinate in coordinates {
+            if !self.is_unknown(joint, coordinate) {
+                continue;
+            }
+            let held = &mut self.freedom.parameters[row(joint) + coordinate];
+            if !std::mem::replace(held, true) {
+                names.push(NAMES[coordinate]);
+            }
+        }
+        if !names.is_empty() {
+            let name = &self.setup.rig.robot.joints[joint].name;
+            self.words.push(format!("{} of joint `{name}` is held: {why}", names.join(", ")));
         }
     }
-    (freedom, words)
+
+    fn is_unknown(&self, joint: usize, coordinate: usize) -> bool {
+        self.priors.parameters[row(joint) + coordinate].is_infinite()
+    }
+
+    fn last(&self) -> usize {
+        self.setup.rig.robot.joints.len() - 1
+    }
+
+    /// The row that holds a, alpha and beta between the axes of this joint and the next.
+    fn twist(&self, joint: usize) -> usize {
+        if self.setup.rig.robot.convention == Convention::ModifiedDh { joint + 1 } else { joint }
+    }
 }
 
 /// The same with the frames of base and tip held against the first axis and against what is fixed to the tip.

@@ -113,6 +113,9 @@ fn name_joints(rig: &mut Rig, recording: &Recording) -> Result<(), Error> {
     if joints.is_empty() {
         joints.extend(recording.joints.iter().map(|name| Joint { name: name.clone(), ..Joint::default() }));
     }
+    if recording.joints.is_empty() {
+        return Err(Error::Unusable("the recording's header names no joint, and a chain needs one".into()));
+    }
     if joints.len() != recording.joints.len() {
         return Err(Error::Unusable(format!(
             "the rig has {} joints, the recording's header names {}",
