@@ -1,6 +1,8 @@
 //! What users are promised, one file per promise.
+mod calibration;
 mod cli;
 mod cli_calibrate;
+mod learning;
 mod malformed_input;
 mod readme;
 mod recording_files;
