@@ -9,3 +9,4 @@ mod recording_files;
 mod rig_files;
 mod simulate;
 mod tidy;
+mod wrong_data;
