@@ -5,6 +5,7 @@ mod cli_calibrate;
 mod deviations;
 mod learning;
 mod malformed_input;
+mod not_enough;
 mod readme;
 mod recording_files;
 mod rig_files;
