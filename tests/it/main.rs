@@ -2,6 +2,7 @@
 mod calibration;
 mod cli;
 mod cli_calibrate;
+mod determinism;
 mod deviations;
 mod learning;
 mod malformed_input;
