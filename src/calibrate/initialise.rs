@@ -37,7 +37,7 @@ pub(crate) fn initialise(seed: u64, stages: &mut Stages<'_>) -> Result<State, Er
         let mut state = seen.state.clone();
         let Some(misfit) = place_chain(&seen.samples(), &mut state, seed, stages) else { continue };
         if let Err(error) = join::join(setup, &mut state, &seen.cameras, &seen.features, seed) {
-            failure = Some(error);
+            failure.get_or_insert(error);
             continue;
         }
         settle(setup, &mut state);

@@ -15,6 +15,7 @@ enum Named {
     Image(usize, String),
     Moved(String),
     Unseen(String),
+    Misfit,
 }
 
 /// What is named, but for single detections.
@@ -24,6 +25,7 @@ fn named(learned: &Calibration) -> Vec<Named> {
         Finding::WrongImage { sample, camera, .. } => Some(Named::Image(*sample, camera.clone())),
         Finding::CameraMoved { camera, .. } => Some(Named::Moved(camera.clone())),
         Finding::UnseenCamera { camera } => Some(Named::Unseen(camera.clone())),
+        Finding::Misfit { .. } => Some(Named::Misfit),
         Finding::Outliers { .. } => None,
     };
     let mut named: Vec<Named> = learned.report.findings.iter().filter_map(name).collect();
