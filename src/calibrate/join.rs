@@ -108,8 +108,9 @@ fn missing_after(setup: &Setup, cameras: &[bool], features: &[bool]) -> Result<(
         let count = setup.observations.iter().filter(|seen| seen.feature == feature).count();
         if !placed && (count > 0 || setup.rig.features[feature].xyz.is_none()) {
             return Err(Error::NotEnoughData(format!(
-                "nothing determines feature `{}`: it is seen {count} times, and two views from different sides are needed",
-                setup.rig.features[feature].name
+                "nothing determines feature `{}`: it is seen {count} time{}, and two views from different sides are needed",
+                setup.rig.features[feature].name,
+                if count == 1 { "" } else { "s" }
             )));
         }
     }

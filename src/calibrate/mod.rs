@@ -87,9 +87,24 @@ pub fn calibrate(
     let takes_part = |index: usize| verdict.active[index];
     let last = Stage { name: "end to end", freedom: &freedom, loss: Loss::Cauchy(TAILS), takes_part: &takes_part };
     let converged = stages.minimize(&last, &mut state)?.termination.converged();
+    check_cameras(&setup, &state)?;
     let deviations = deviations(&stages, &last, &state, &verdict);
     let reports = std::mem::take(&mut stages.reports);
     Ok(finish(&setup, &state, verdict, reports, converged, gauge, deviations))
+}
+
+/// A camera that projects backwards or not at all was not learned.
+fn check_cameras(setup: &Setup, state: &State) -> Result<(), Error> {
+    for (camera, learned) in setup.rig.cameras.iter().zip(&state.model.cameras) {
+        let [fx, fy, ..] = learned.intrinsics;
+        if !(fx > 0.0 && fy > 0.0 && learned.intrinsics.iter().all(|value| value.is_finite())) {
+            return Err(Error::NotEnoughData(format!(
+                "the data do not determine camera `{}`: its focal lengths went to {fx:.1} and {fy:.1} px; give its intrinsics",
+                camera.name
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// Width of Cauchy's loss in the last stage [standard deviations]. Real errors have heavier tails than a Gaussian; on Gaussian

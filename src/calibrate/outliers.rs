@@ -43,6 +43,11 @@ const IN_IMAGE: usize = 3;
 /// Samples with wrong joints among which swapped pairs are looked for, at most.
 const SWAPPED: usize = 40;
 
+/// A camera was bumped, rather than its images mistaken, where at least this many are wrong and make up more than this share of
+/// all or are the first or the last.
+const BUMPED: usize = 4;
+const MISTAKES: f64 = 0.2;
+
 /// Images count as shifted where the squares of their mean errors are this many times what noise explains.
 const SHIFTED: f64 = 4.0;
 
@@ -88,6 +93,10 @@ pub(crate) fn judge(setup: &Setup, state: &State, left_out: &[bool], moved: &[bo
             wrong_images.extend(wrong);
         }
     }
+    for camera in bumped_cameras(&verdict.moved, &medians, &wrong_images) {
+        verdict.moved[camera] = true;
+        wrong_images.retain(|image| image.1 != camera);
+    }
     let mut single = 0;
     for ((index, seen), distance) in setup.observations.iter().enumerate().zip(&distances) {
         let with_others = verdict.moved[seen.camera]
@@ -103,6 +112,26 @@ pub(crate) fn judge(setup: &Setup, state: &State, left_out: &[bool], moved: &[bo
         verdict.findings.push(Finding::Outliers { count: single, of: distances.len() });
     }
     verdict
+}
+
+/// Cameras with too many wrong images for mistakes: many of all, or all from some sample on, or all up to one.
+fn bumped_cameras(
+    moved: &[bool],
+    medians: &BTreeMap<(usize, usize), f64>,
+    wrong_images: &BTreeSet<(usize, usize)>,
+) -> Vec<usize> {
+    let mut bumped = Vec::new();
+    for camera in (0..moved.len()).filter(|&camera| !moved[camera]) {
+        let wrong: Vec<bool> =
+            medians.keys().filter(|key| key.1 == camera).map(|key| wrong_images.contains(key)).collect();
+        let count = wrong.iter().filter(|wrong| **wrong).count();
+        let at_one_end = wrong[..count].iter().all(|wrong| *wrong) || wrong[wrong.len() - count..].iter().all(|w| *w);
+        let others = moved.iter().filter(|moved| !**moved).count() - bumped.len();
+        if others > 1 && count >= BUMPED && (at_one_end || count as f64 > MISTAKES * wrong.len() as f64) {
+            bumped.push(camera);
+        }
+    }
+    bumped
 }
 
 /// Distance of every observation from where the state predicts it [px].

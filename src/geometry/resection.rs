@@ -8,7 +8,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 /// Samples that are drawn at least and at most.
-const SAMPLES: [usize; 2] = [20, 500];
+const SAMPLES: [usize; 2] = [20, 150];
 
 /// Points on which hypotheses are scored; the solution is refined and judged on all.
 const SCORED: usize = 300;

@@ -1,9 +1,11 @@
 //! Wrong data are named, each by its right sample and camera and nothing else, and do not spoil what is learned.
-use crate::learning::{learn, nominal_chain, nothing, over_floor, record};
-use handeye::calibrate::{Calibration, Finding};
+use crate::learning::{Normal, learn, nominal_chain, nothing, over_floor, record};
+use handeye::calibrate::{Calibration, Finding, evaluate};
 use handeye::recording::{Detection, Recording};
 use handeye::rig::Rig;
 use handeye::simulate::{SimulateOptions, random_rig, simulate};
+use handeye::solvers::Pose;
+use nalgebra::Vector3;
 
 const SEEDS: u64 = 5;
 const SAMPLES: usize = 50;
@@ -124,4 +126,51 @@ fn several_faults_among_outliers_are_all_named() {
             planted
         });
     }
+}
+/// Shifts and turns one of three cameras by 2 cm and 2 degrees after a part of the recording.
+fn a_bump_is_named(before: usize) {
+    let mut failures = Vec::new();
+    for seed in 0..SEEDS {
+        let truth = random_rig(6, 3, 12, seed);
+        let bumped = (seed % 3) as usize;
+        let mut moved = truth.clone();
+        let mut normal = Normal::new(seed);
+        let mut direction = |length: f64| Vector3::from_fn(|_, _| normal.draw(1.0)).normalize() * length;
+        let bump = Pose::new(direction(2.0_f64.to_radians()), direction(0.02));
+        moved.cameras[bumped].pose = truth.cameras[bumped].pose.map(|pose| pose * bump);
+        let mut recording = record(&truth, before, seed);
+        recording.samples.extend(record(&moved, SAMPLES - before, seed + 5000).samples);
+        let expected = [Named::Moved(truth.cameras[bumped].name.clone())];
+        for (start, rig) in [("nothing", nothing(&truth)), ("nominal", nominal_chain(&truth, seed))] {
+            match learn(&rig, &recording) {
+                Ok(learned) => {
+                    let judged = evaluate(&learned.rig, &record(&truth, 100, seed + 9000)).unwrap();
+                    let floor = truth.noise.pixels * 2.0_f64.sqrt();
+                    let ratios: Vec<f64> = judged.cameras.iter().map(|camera| camera.errors.rms_px / floor).collect();
+                    // Where most of the recording has the camera, its pose is that from before the bump.
+                    let bar = |camera: usize| match camera == bumped {
+                        false => 1.10,
+                        true if 3 * before > 2 * SAMPLES => 1.30,
+                        true => f64::INFINITY,
+                    };
+                    let found = named(&learned);
+                    if found != expected || (0..3).any(|camera| ratios[camera] > bar(camera)) {
+                        failures.push(format!("{start}, seed {seed}: {ratios:.3?}, {found:?} for {expected:?}"));
+                    }
+                }
+                Err(error) => failures.push(format!("{start}, seed {seed}: {error}")),
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{} of {}: {failures:#?}", failures.len(), 2 * SEEDS);
+}
+
+#[test]
+fn a_camera_that_is_bumped_halfway_is_named() {
+    a_bump_is_named(SAMPLES / 2);
+}
+
+#[test]
+fn a_camera_that_is_bumped_late_stays_where_it_was_before() {
+    a_bump_is_named(4 * SAMPLES / 5);
 }
