@@ -1,5 +1,5 @@
 //! CPU time to the optimum of the peers' calibration problems, beside Ceres in the same run: see benches/peers.sh.
-use cpu_time::ThreadTime;
+use cpu_time::ProcessTime;
 use handeye::solvers::LevenbergMarquardt;
 use peer_problem::PeerProblem;
 use std::path::PathBuf;
@@ -10,6 +10,8 @@ mod peer_problem;
 fn main() {
     let folder = std::env::var_os("HANDEYE_SHARED").map_or_else(|| PathBuf::from("../shared"), PathBuf::from);
     for (name, joints_free) in [("noisy_T50", false), ("noisy_T50", true), ("noisy_T200", false), ("noisy_T200", true)]
+        .into_iter()
+        .take(std::env::var("N").map_or(4, |r| r.parse().unwrap()))
     {
         let path = folder.join("peers/calibration").join(format!("{name}.txt"));
         let Some(problem) = PeerProblem::read(&path) else {
@@ -18,9 +20,9 @@ fn main() {
         };
         let mut best = f64::INFINITY;
         let mut last = None;
-        for _ in 0..20 {
+        for _ in 0..std::env::var("REPS").map_or(20, |r| r.parse().unwrap()) {
             let mut graph = problem.graph(joints_free);
-            let start = ThreadTime::now();
+            let start = ProcessTime::now();
             let mut solver = handeye::solvers::Solver::new(&graph);
             let verbose = last.is_none() && std::env::var_os("V").is_some();
             let report = LevenbergMarquardt::default()

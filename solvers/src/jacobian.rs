@@ -119,23 +119,11 @@ fn for_each_free(columns: &[Columns<'_>], first: usize, mut each: impl FnMut(usi
     }
 }
 
-/// Moves the free columns of every row together, so that held coordinates are gone. Returns the new width; `starts`
-/// receives where each argument begins.
+/// Moves the free columns of every row together, so that held coordinates are gone. `active`: how many are free.
 #[inline]
-pub(crate) fn compact(
-    data: &mut [f64],
-    rows: usize,
-    width: usize,
-    columns: &[Columns<'_>],
-    starts: &mut [usize],
-) -> usize {
-    let mut active = 0;
-    for (start, argument) in starts.iter_mut().zip(columns) {
-        *start = active;
-        active += argument.active();
-    }
+pub(crate) fn compact(data: &mut [f64], rows: usize, width: usize, columns: &[Columns<'_>], active: usize) {
     if active == width {
-        return width;
+        return;
     }
     let mut to = 0;
     for row in 0..rows {
@@ -156,5 +144,4 @@ pub(crate) fn compact(
             }
         }
     }
-    active
 }

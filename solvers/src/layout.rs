@@ -70,8 +70,14 @@ impl Layout {
         let mut places = places(graph);
         let (chunk_of_factor, chunk_of_derived, chunk_count) = chunks(graph);
         let owner = owners(graph, &places, &chunk_of_factor, &chunk_of_derived);
-        let mut builder =
-            Builder { places: &mut places, owner, shared: BTreeMap::new(), shared_len: 0, blocks: Vec::new() };
+        let mut builder = Builder {
+            places: &mut places,
+            owner,
+            shared: BTreeMap::new(),
+            shared_len: 0,
+            blocks: Vec::new(),
+            near: vec![Vec::new(); graph.nodes.len()],
+        };
         for (node, _) in graph.nodes.iter().enumerate() {
             if builder.owner[node] == Owner::Shared && builder.places[node].active > 0 {
                 builder.places[node].gradient = Offset::shared(builder.shared_len);
@@ -159,20 +165,34 @@ struct Builder<'a> {
     shared_len: usize,
     /// Private blocks of all chunks so far.
     blocks: Vec<Block>,
+    /// Of [`Pattern::near`], empty between chunks.
+    near: Vec<Vec<(u32, Offset)>>,
 }
 
-/// Blocks of one chunk, and who is next to whom in them.
-#[derive(Default)]
+/// Blocks of one chunk.
 struct Pattern {
-    offsets: BTreeMap<(u32, u32), Offset>,
-    neighbours: BTreeMap<u32, BTreeSet<u32>>,
+    /// By node: every node that it has a block with, in order, and where that is.
+    near: Vec<Vec<(u32, Offset)>>,
     len: usize,
+}
+
+impl Pattern {
+    fn find(&self, a: u32, b: u32) -> Result<Offset, usize> {
+        let near = &self.near[a as usize];
+        near.binary_search_by_key(&b, |&(other, _)| other).map(|place| near[place].1)
+    }
+
+    fn insert(&mut self, a: u32, b: u32, offset: Offset) {
+        if let Err(place) = self.find(a, b) {
+            self.near[a as usize].insert(place, (b, offset));
+        }
+    }
 }
 
 impl Builder<'_> {
     fn chunk(&mut self, graph: &Graph, index: usize, factors: &[usize], derived: &[usize]) -> Chunk {
         let mut chunk = Chunk::default();
-        let mut pattern = Pattern::default();
+        let mut pattern = Pattern { near: std::mem::take(&mut self.near), len: 0 };
         for &derived in derived {
             let node = graph.derived[derived].node as usize;
             self.places[node].start = chunk.derived as u32;
@@ -190,7 +210,7 @@ impl Builder<'_> {
             touch(graph.derived[derived].node);
             parents(graph, derived as u32).iter().for_each(|&node| touch(node));
         }
-        for node in chunk_nodes {
+        for &node in &chunk_nodes {
             let place = &mut self.places[node as usize];
             if self.owner[node as usize] == Owner::Chunk(index) && place.active > 0 {
                 place.gradient = Offset::private(pattern.len);
@@ -212,8 +232,14 @@ impl Builder<'_> {
         plans.reverse();
         chunk.functions = plans;
         chunk.private = pattern.len;
-        let private = pattern.offsets.into_iter().filter(|(_, offset)| !offset.is_shared());
-        self.blocks.extend(private.map(|((row, column), offset)| Block { row, column, chunk: index as u32, offset }));
+        for &column in &chunk_nodes {
+            for (row, offset) in pattern.near[column as usize].drain(..) {
+                if row <= column && !offset.is_shared() {
+                    self.blocks.push(Block { row, column, chunk: index as u32, offset });
+                }
+            }
+        }
+        self.near = pattern.near;
         chunk
     }
 
@@ -237,14 +263,8 @@ impl Builder<'_> {
         plan.diagonal = self.offset(pattern, node, node);
         // Derived nodes that were created later are substituted first, and no longer matter.
         let remains = |&other: &u32| other < node || !self.places[other as usize].derived;
-        let neighbours: Vec<u32> = pattern
-            .neighbours
-            .get(&node)
-            .into_iter()
-            .flatten()
-            .copied()
-            .filter(|&o| o != node && remains(&o))
-            .collect();
+        let near = pattern.near[node as usize].iter().map(|&(other, _)| other);
+        let neighbours: Vec<u32> = near.filter(|other| *other != node && remains(other)).collect();
         self.pairs(pattern, nodes, &mut plan.parents);
         for other in neighbours {
             let own = self.offset(pattern, node, other);
@@ -268,13 +288,14 @@ impl Builder<'_> {
         if size == 0 {
             return Offset::NONE;
         }
-        let key = (a.min(b), a.max(b));
-        if let Some(&offset) = pattern.offsets.get(&key) {
+        // Nodes with few neighbours, such as those of one sample, tend to be the later ones.
+        let (low, high) = (a.min(b), a.max(b));
+        if let Ok(offset) = pattern.find(high, low) {
             return offset;
         }
         let is_shared = |node: u32| self.owner[node as usize] == Owner::Shared;
         let offset = if is_shared(a) && is_shared(b) {
-            *self.shared.entry(key).or_insert_with(|| {
+            *self.shared.entry((low, high)).or_insert_with(|| {
                 self.shared_len += size;
                 Offset::shared(self.shared_len - size)
             })
@@ -282,9 +303,8 @@ impl Builder<'_> {
             pattern.len += size;
             Offset::private(pattern.len - size)
         };
-        pattern.offsets.insert(key, offset);
-        pattern.neighbours.entry(a).or_default().insert(b);
-        pattern.neighbours.entry(b).or_default().insert(a);
+        pattern.insert(high, low, offset);
+        pattern.insert(low, high, offset);
         offset
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! Knows no robot, no camera and no file: see the crate `handeye` for those.
 mod accumulate;
+mod batch;
 pub mod check;
 mod chunks;
 mod covariance;
@@ -22,6 +23,7 @@ pub mod manifold;
 mod minibatches;
 mod noise;
 mod pool;
+mod product;
 mod report;
 pub mod scalar;
 mod substitute;

@@ -1,8 +1,9 @@
 //! Substitutes derived nodes: what factors say of one is moved to what it is derived from.
-use crate::accumulate::{Offset, Run, Want, add_scaled};
+use crate::accumulate::{Offset, Run, Want};
 use crate::graph::Graph;
 use crate::layout::FunctionPlan;
 use crate::pool::grown;
+use crate::product::{Strip, add_product, add_scaled};
 
 /// Moves all that H and b say of a derived node d = f(P) to its parents P, with G = ∂d/∂P:
 ///
@@ -60,15 +61,12 @@ pub(crate) fn substitute(graph: &Graph, plan: &FunctionPlan, run: &mut Run<'_>) 
             pair += 1;
             if offset != Offset::NONE {
                 let block = run.block(offset, da * db);
-                let (ga, pb) = ((&*g, start_a, da), (&*product, start_b, db));
-                let (pa, gb) = ((&*product, start_a, da), (&*g, start_b, db));
+                let strip = |matrix, start, len| Strip { matrix, width, start, len };
                 if first <= second {
-                    add_product_of(block, ga, width, pb, width, rows);
-                } else {
-                    add_product_of(block, gb, width, pa, width, rows);
+                    add_product(block, strip(g, start_a, da), strip(product, start_b, db));
                 }
-                if first == second && start_a != start_b {
-                    add_product_of(block, gb, width, pa, width, rows);
+                if first > second || (first == second && start_a != start_b) {
+                    add_product(block, strip(g, start_b, db), strip(product, start_a, da));
                 }
             }
             start_b += db;
@@ -109,37 +107,16 @@ fn substitute_neighbour(
         let d = dim(parent);
         if offset != Offset::NONE {
             let block = run.block(offset, d * columns);
-            let (gp, sx) = ((g, start, d), (&*s_rows, 0, columns));
+            let g = Strip { matrix: g, width, start, len: d };
+            let s = Strip { matrix: s_rows, width: columns, start: 0, len: columns };
             if parent <= other {
-                add_product_of(block, gp, width, sx, columns, rows);
+                add_product(block, g, s);
             }
             if parent >= other {
-                add_product_of(block, sx, columns, gp, width, rows);
+                add_product(block, s, g);
             }
         }
         start += d;
     }
     run.scratch.residual = s;
-}
-
-/// Columns `start..start + len` of a matrix stored by rows: (matrix, start, len).
-type Slice<'a> = (&'a [f64], usize, usize);
-
-/// block += Aᵀ B; the block is stored by columns, with A's columns as rows.
-#[inline]
-fn add_product_of(
-    block: &mut [f64],
-    (a, start_a, da): Slice<'_>,
-    width_a: usize,
-    (b, start_b, db): Slice<'_>,
-    width_b: usize,
-    rows: usize,
-) {
-    for i in 0..rows {
-        let a = &a[i * width_a + start_a..i * width_a + start_a + da];
-        let b = &b[i * width_b + start_b..i * width_b + start_b + db];
-        for (column, &s) in block.chunks_exact_mut(da).zip(b) {
-            add_scaled(column, s, a);
-        }
-    }
 }

@@ -1,9 +1,10 @@
 //! Evaluates a graph: costs, and normal equations with the derived nodes substituted.
-use crate::accumulate::{Offset, Run, Scratch, Want, add_scaled, arguments};
+use crate::accumulate::{Offset, Run, Scratch, Want, arguments};
 use crate::graph::Graph;
 use crate::jacobian::{Jacobian, compact};
 use crate::layout::{Block, Chunk, FunctionPlan, Layout};
-use crate::pool::{MOST, grown};
+use crate::pool::grown;
+use crate::product::add_scaled;
 use crate::substitute::substitute;
 use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
@@ -101,14 +102,21 @@ impl Workspace {
             pass.run(&layout.chunks[0], data, &mut self.shared);
             return data.cost;
         }
+        let run = |((chunk, data), shared): ((&Chunk, &mut ChunkData), &mut Vec<f64>)| {
+            if derivatives {
+                shared.fill(0.0);
+            }
+            pass.run(chunk, data, shared);
+        };
+        // Handing work to another thread and waiting for it is for nothing where there is only one.
+        let alone = rayon::current_num_threads() == 1;
         for (chunks, data) in layout.chunks.chunks(WAVE).zip(self.chunks.chunks_mut(WAVE)) {
             let copies = &mut self.wave[..chunks.len()];
-            chunks.par_iter().zip(data).zip(&mut *copies).with_max_len(1).for_each(|((chunk, data), shared)| {
-                if derivatives {
-                    shared.fill(0.0);
-                }
-                pass.run(chunk, data, shared);
-            });
+            if alone {
+                chunks.iter().zip(data).zip(&mut *copies).for_each(run);
+            } else {
+                chunks.par_iter().zip(data).zip(&mut *copies).with_max_len(1).for_each(run);
+            }
             if derivatives {
                 for copy in copies {
                     add_scaled(&mut self.shared, 1.0, copy);
@@ -294,7 +302,8 @@ impl Pass<'_> {
         let g = grown(&mut data.scratch.jacobian, rows * arguments.width);
         let jacobian = &mut Jacobian { data: &mut *g, columns, width: arguments.width };
         pool.evaluate(plan.place as usize, x, y, Some(jacobian));
-        let len = rows * compact(g, rows, arguments.width, columns, &mut [0; MOST]);
+        compact(g, rows, arguments.width, columns, arguments.active);
+        let len = rows * arguments.active;
         data.private[plan.jacobian..plan.jacobian + len].copy_from_slice(&g[..len]);
     }
 }
