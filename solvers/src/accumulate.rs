@@ -84,47 +84,53 @@ pub(crate) struct Run<'a> {
 pub(crate) struct Arguments<'a> {
     pub x: [&'a [f64]; MOST],
     pub columns: [Columns<'a>; MOST],
-    /// Columns of the full Jacobian.
+    /// Columns of the full Jacobian, and how many of them are free.
     pub width: usize,
-    /// First column and number of columns of each argument once held coordinates are gone, and how many there are of all.
-    pub active_columns: [(usize, usize); MOST],
     pub active: usize,
+    /// What was looked up last.
+    ids: [u32; MOST],
 }
 
-/// Looks up where the arguments are stored and which of their coordinates are free.
-#[inline]
-pub(crate) fn arguments<'a>(
-    ids: &[u32],
-    nodes: &'a [Node],
-    places: &[Place],
-    values: &'a [f64],
-    derived: &'a [f64],
-) -> Arguments<'a> {
-    const NOTHING: Columns<'static> = Columns { start: 0, len: 0, free: Coordinates::None };
-    let mut arguments =
-        Arguments { x: [&[]; MOST], columns: [NOTHING; MOST], width: 0, active_columns: [(0, 0); MOST], active: 0 };
-    for (k, &id) in ids.iter().enumerate() {
-        let place = &places[id as usize];
-        let store = if place.derived { derived } else { values };
-        let start = place.start as usize;
-        arguments.x[k] = &store[start..start + usize::from(place.ambient)];
-        let free = match &nodes[id as usize].free {
-            _ if place.active == 0 => Coordinates::None,
-            Some(free) if !place.derived => Coordinates::Some(free),
-            _ => Coordinates::All,
-        };
-        arguments.columns[k] = Columns { start: arguments.width, len: usize::from(place.tangent), free };
-        arguments.width += usize::from(place.tangent);
-        arguments.active_columns[k] = (arguments.active, usize::from(place.active));
-        arguments.active += usize::from(place.active);
+impl<'a> Arguments<'a> {
+    /// To be filled, and then filled again for the next factor: it is too large to make anew for each.
+    pub fn none() -> Self {
+        const NOTHING: Columns<'static> = Columns { start: 0, len: 0, active: 0, free: Coordinates::None };
+        Arguments { x: [&[]; MOST], columns: [NOTHING; MOST], width: 0, active: 0, ids: [u32::MAX; MOST] }
     }
-    arguments
+
+    /// Looks up where the arguments are stored and which of their coordinates are free.
+    #[inline]
+    pub fn look_up(&mut self, ids: &[u32], nodes: &'a [Node], places: &[Place], values: &'a [f64], derived: &'a [f64]) {
+        (self.width, self.active) = (0, 0);
+        for (((&id, last), x), columns) in ids.iter().zip(&mut self.ids).zip(&mut self.x).zip(&mut self.columns) {
+            // Most arguments of a factor are also those of the one before.
+            if *last == id && columns.start == self.width {
+                self.width += columns.len;
+                self.active += columns.active;
+                continue;
+            }
+            *last = id;
+            let place = &places[id as usize];
+            let store = if place.derived { derived } else { values };
+            let start = place.start as usize;
+            *x = &store[start..start + usize::from(place.ambient)];
+            let free = match &nodes[id as usize].free {
+                _ if place.active == 0 => Coordinates::None,
+                Some(free) if !place.derived => Coordinates::Some(free),
+                _ => Coordinates::All,
+            };
+            let (len, active) = (usize::from(place.tangent), usize::from(place.active));
+            *columns = Columns { start: self.width, len, active, free };
+            self.width += len;
+            self.active += active;
+        }
+    }
 }
 
 impl<'a> Run<'a> {
     #[inline]
-    pub fn arguments(&self, ids: &[u32]) -> Arguments<'a> {
-        arguments(ids, self.nodes, self.places, self.values, self.derived)
+    pub fn look_up(&self, ids: &[u32], arguments: &mut Arguments<'a>) {
+        arguments.look_up(ids, self.nodes, self.places, self.values, self.derived);
     }
 
     /// Passes over the blocks of a factor that adds none.

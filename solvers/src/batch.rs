@@ -1,6 +1,6 @@
 //! Normal equations of consecutive factors, accumulated together where they are on the same nodes.
 use crate::accumulate::{Arguments, Run, Want};
-use crate::pool::MOST;
+use crate::pool::{MOST, grown};
 use crate::product::{Strip, add_product};
 
 /// A batch that has this many rows takes no further factor: what it holds stays in the fastest cache.
@@ -14,7 +14,7 @@ const LONGEST: usize = 64;
 pub(crate) struct Batch {
     /// The nodes of each factor in turn.
     nodes: Vec<u32>,
-    /// First column and number of columns of each argument.
+    /// First column and number of free columns of each argument.
     columns: [(usize, usize); MOST],
     /// Whether all factors have the same node for an argument.
     shared: [bool; MOST],
@@ -33,7 +33,7 @@ impl Batch {
             self.flush(run);
         }
         let used = self.r.len() * self.width;
-        crate::pool::grown(&mut self.jacobian, used + rows * arguments.width);
+        grown(&mut self.jacobian, used + rows * arguments.width);
         &mut self.jacobian[used..used + rows * arguments.width]
     }
 
@@ -43,7 +43,8 @@ impl Batch {
         let n = self.arguments;
         let is_second = self.nodes.len() == n;
         self.r.len() < LONGEST
-            && self.columns[..n] == arguments.active_columns[..n]
+            && self.width == arguments.width
+            && self.columns[..n].iter().zip(&arguments.columns).all(|(own, c)| *own == (c.start, c.active))
             && nodes.iter().zip(&self.nodes).zip(self.shared).all(|((a, b), shared)| a == b || !shared || is_second)
     }
 
@@ -52,8 +53,8 @@ impl Batch {
     pub fn push(&mut self, nodes: &[u32], arguments: &Arguments<'_>, r: &[f64]) {
         if self.nodes.is_empty() {
             self.arguments = nodes.len();
-            self.columns = arguments.active_columns;
-            self.width = arguments.active;
+            self.columns = arguments.columns.map(|columns| (columns.start, columns.active));
+            self.width = arguments.width;
             self.shared = [true; MOST];
         } else if self.nodes.len() == self.arguments {
             for ((shared, a), b) in self.shared.iter_mut().zip(nodes).zip(&self.nodes) {

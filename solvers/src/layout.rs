@@ -8,6 +8,7 @@
 use crate::accumulate::{Offset, Place};
 use crate::chunks::{Owner, chunks, owners, parents};
 use crate::graph::{Graph, Role};
+use crate::groups::{Group, Ties, groups};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
@@ -45,24 +46,20 @@ pub(crate) struct Chunk {
     pub offsets: Vec<Offset>,
     /// Derived nodes, in order of creation.
     pub functions: Vec<FunctionPlan>,
+    /// The same, as they are substituted.
+    pub groups: Vec<Group>,
     /// Length of the chunk's own arena, and of its derived values.
     pub private: usize,
     pub derived: usize,
 }
 
-/// How one derived node is evaluated and substituted.
+/// How one derived node is evaluated.
 pub(crate) struct FunctionPlan {
     pub pool: u32,
     pub place: u32,
     pub node: u32,
-    /// Its Jacobian G (rows: its step, columns: free coordinates of its parents) in the chunk's arena.
+    /// Where its Jacobian goes in the chunk's arena (see [`crate::groups::Ties`]).
     pub jacobian: usize,
-    /// Its own block of H.
-    pub diagonal: Offset,
-    /// Blocks between its parents: one per pair (a, b) with a <= b, NONE where one is held.
-    pub parents: Vec<Offset>,
-    /// Nodes that it shares factors with: the block with each, and that node's block with each parent.
-    pub neighbours: Vec<(u32, Offset, Vec<Offset>)>,
 }
 
 impl Layout {
@@ -227,10 +224,17 @@ impl Builder<'_> {
             let nodes = graph.factors[pool as usize].nodes(place);
             self.pairs(&mut pattern, nodes, &mut chunk.offsets);
         }
-        let mut plans: Vec<FunctionPlan> =
-            derived.iter().rev().map(|&derived| self.function(graph, derived, &mut pattern)).collect();
-        plans.reverse();
-        chunk.functions = plans;
+        // Derived nodes that were created later are substituted first: what they leave behind is laid out by then.
+        let mut ties = Vec::new();
+        for &derived in derived.iter().rev() {
+            let entry = &graph.derived[derived];
+            let (pool, place, node) = (entry.pool, entry.place, entry.node);
+            chunk.functions.push(FunctionPlan { pool, place, node, jacobian: pattern.len });
+            ties.extend(self.ties(graph, derived, &mut pattern));
+        }
+        chunk.functions.reverse();
+        ties.reverse();
+        chunk.groups = groups(graph, self.places, &ties);
         chunk.private = pattern.len;
         for &column in &chunk_nodes {
             for (row, offset) in pattern.near[column as usize].drain(..) {
@@ -243,35 +247,29 @@ impl Builder<'_> {
         chunk
     }
 
-    fn function(&mut self, graph: &Graph, derived: usize, pattern: &mut Pattern) -> FunctionPlan {
-        let entry = &graph.derived[derived];
-        let (node, nodes) = (entry.node, parents(graph, derived as u32));
-        let mut plan = FunctionPlan {
-            pool: entry.pool,
-            place: entry.place,
-            node,
-            jacobian: pattern.len,
-            diagonal: Offset::NONE,
-            parents: Vec::new(),
-            neighbours: Vec::new(),
-        };
-        if self.places[node as usize].active == 0 {
-            return plan;
+    /// What a derived node is tied to; `None` where it is constant.
+    fn ties(&mut self, graph: &Graph, derived: usize, pattern: &mut Pattern) -> Option<Ties> {
+        let (node, nodes) = (graph.derived[derived].node, parents(graph, derived as u32));
+        let rows = usize::from(self.places[node as usize].active);
+        if rows == 0 {
+            return None;
         }
+        let jacobian = pattern.len;
         let active: usize = nodes.iter().map(|&parent| usize::from(self.places[parent as usize].active)).sum();
-        pattern.len += usize::from(self.places[node as usize].active) * active;
-        plan.diagonal = self.offset(pattern, node, node);
-        // Derived nodes that were created later are substituted first, and no longer matter.
+        pattern.len += rows * active;
+        let diagonal = self.offset(pattern, node, node);
         let remains = |&other: &u32| other < node || !self.places[other as usize].derived;
         let near = pattern.near[node as usize].iter().map(|&(other, _)| other);
-        let neighbours: Vec<u32> = near.filter(|other| *other != node && remains(other)).collect();
-        self.pairs(pattern, nodes, &mut plan.parents);
-        for other in neighbours {
+        let near: Vec<u32> = near.filter(|other| *other != node && remains(other)).collect();
+        let mut parents = Vec::new();
+        self.pairs(pattern, nodes, &mut parents);
+        let mut neighbours = Vec::new();
+        for other in near {
             let own = self.offset(pattern, node, other);
             let with_parents = nodes.iter().map(|&parent| self.offset(pattern, parent, other)).collect();
-            plan.neighbours.push((other, own, with_parents));
+            neighbours.push((other, own, with_parents));
         }
-        plan
+        Some(Ties { derived, node, jacobian, diagonal, parents, neighbours })
     }
 
     fn pairs(&mut self, pattern: &mut Pattern, nodes: &[u32], offsets: &mut Vec<Offset>) {

@@ -13,6 +13,7 @@ mod factor;
 mod gauss_newton;
 mod graduated;
 mod graph;
+mod groups;
 mod jacobian;
 mod layout;
 mod lbfgs;

@@ -1,5 +1,5 @@
 //! Factors and functions of one type side by side, behind one call per run of them.
-use crate::accumulate::{Run, Want};
+use crate::accumulate::{Arguments, Run, Want};
 use crate::jacobian::{Jacobian, compact, forward};
 use crate::scalar::Dual;
 use crate::{Factor, Function, Loss, Noise, Variable, Variables};
@@ -78,9 +78,10 @@ impl<F: Factor<M>, const M: usize> FactorPool for Pool<F, M> {
 
     fn run(&self, range: Range<usize>, run: &mut Run<'_>) {
         let mut batch = std::mem::take(&mut run.scratch.batch);
+        let mut arguments = Arguments::none();
         for placed in &self.placed[range] {
             let nodes = placed.nodes.as_ref();
-            let arguments = run.arguments(nodes);
+            run.look_up(nodes, &mut arguments);
             let (x, columns) = (&arguments.x[..nodes.len()], &arguments.columns[..nodes.len()]);
             if run.want == Want::Cost || arguments.active == 0 {
                 batch.flush(run);
@@ -93,8 +94,8 @@ impl<F: Factor<M>, const M: usize> FactorPool for Pool<F, M> {
             let data = batch.room(run, nodes, &arguments, M);
             let mut r =
                 placed.factor.evaluate(x, Some(&mut Jacobian { data: &mut *data, columns, width: arguments.width }));
-            let width = arguments.active;
-            compact(data, M, arguments.width, columns, width);
+            let width = arguments.width;
+            compact(data, width, columns);
             placed.noise.whiten(&mut r, Some((&mut *data, width)));
             let (rho, slope) = placed.loss.evaluate(squared(&r), run.graduation);
             run.cost += 0.5 * rho;
@@ -189,8 +190,9 @@ impl<V: Variable<Over<f64> = V>> FactorPool for PriorPool<V> {
         let mut batch = std::mem::take(&mut run.scratch.batch);
         let mut residual = std::mem::take(&mut run.scratch.residual);
         let mut steps = std::mem::take(&mut run.scratch.steps);
+        let mut arguments = Arguments::none();
         for prior in &self.placed[range] {
-            let arguments = run.arguments(&prior.node);
+            run.look_up(&prior.node, &mut arguments);
             let rows = prior.weights.len();
             let r = grown(&mut residual, rows);
             self.whitened(prior, arguments.x[0], r);
@@ -209,8 +211,8 @@ impl<V: Variable<Over<f64> = V>> FactorPool for PriorPool<V> {
                 &mut steps,
                 |(y,), steps| V::local(&prior.mean, &y, steps),
             );
-            let width = arguments.active;
-            compact(data, rows, arguments.width, columns, width);
+            let width = arguments.width;
+            compact(data, width, columns);
             for (row, w) in prior.weights.iter().enumerate() {
                 data[row * width..(row + 1) * width].iter_mut().for_each(|x| *x *= w);
             }

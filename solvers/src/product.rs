@@ -11,18 +11,18 @@ pub(crate) struct Strip<'a> {
     pub len: usize,
 }
 
-impl Strip<'_> {
-    /// `N` entries of a row, the first of them in column `start + i`.
+impl<'a> Strip<'a> {
+    /// The strip's part of a row, from its column `i` on.
     #[inline(always)]
-    fn entries<const N: usize>(&self, row: usize, i: usize) -> &[f64; N] {
-        self.matrix[row * self.width + self.start + i..].first_chunk().expect("a row has that many entries")
+    fn row(&self, row: usize, i: usize) -> &'a [f64] {
+        let start = row * self.width + self.start;
+        &self.matrix[start + i..start + self.len]
     }
 }
 
 /// block += Aᵀ B for A and B of equally many rows; the block is stored by columns, with A's columns as its rows.
 ///
-/// Works in tiles of up to 6 x 2 whose sums stay in registers while the rows pass by, so that a block is read and written
-/// once however many rows there are. Steps of poses have 6 coordinates, and their blocks no remainder.
+/// Goes through the block in bands of up to 6 rows: steps of poses have 6 coordinates.
 #[inline]
 pub(crate) fn add_product(block: &mut [f64], a: Strip<'_>, b: Strip<'_>) {
     let mut i = 0;
@@ -37,31 +37,53 @@ pub(crate) fn add_product(block: &mut [f64], a: Strip<'_>, b: Strip<'_>) {
     }
 }
 
-/// `R` rows of the block, from row `i` on. Returns `R`.
+/// Rows `i` to `i + R` of the block. Returns `R`.
 #[inline]
 fn add_band<const R: usize>(block: &mut [f64], a: Strip<'_>, b: Strip<'_>, i: usize) -> usize {
-    let mut j = 0;
-    while j + 2 <= b.len {
-        add_tile::<R, 2>(block, a, b, (i, j));
-        j += 2;
+    if a.matrix.len() == 2 * a.width {
+        add_pixel(block, a, b, i, [first::<R>(a.row(0, i)), first::<R>(a.row(1, i))]);
+        return R;
     }
-    if j < b.len {
-        add_tile::<R, 1>(block, a, b, (i, j));
+    let mut j = 0;
+    while j < b.len {
+        j += match b.len - j {
+            1 => add_tile::<R, 1>(block, a, b, (i, j)),
+            2 | 4 => add_tile::<R, 2>(block, a, b, (i, j)),
+            _ => add_tile::<R, 3>(block, a, b, (i, j)),
+        };
     }
     R
 }
 
-/// `R` rows and `C` columns of the block, from (i, j) on.
+/// A band of a product of two rows, which is what one pixel makes.
 #[inline(always)]
-fn add_tile<const R: usize, const C: usize>(block: &mut [f64], a: Strip<'_>, b: Strip<'_>, (i, j): (usize, usize)) {
+fn add_pixel<const R: usize>(block: &mut [f64], a: Strip<'_>, b: Strip<'_>, i: usize, [x, y]: [&[f64; R]; 2]) {
+    for ((column, s), t) in block.chunks_exact_mut(a.len).zip(b.row(0, 0)).zip(b.row(1, 0)) {
+        for ((h, x), y) in column[i..i + R].iter_mut().zip(x).zip(y) {
+            *h += s * x + t * y;
+        }
+    }
+}
+
+/// `R` rows and `C` columns of the block, from (i, j) on: their sums stay in registers while the rows of A and B pass by,
+/// so that the block is read and written once however many there are. Returns `C`.
+#[inline(always)]
+fn add_tile<const R: usize, const C: usize>(
+    block: &mut [f64],
+    a: Strip<'_>,
+    b: Strip<'_>,
+    (i, j): (usize, usize),
+) -> usize {
     let mut sums = [[0.0; R]; C];
-    for row in 0..a.matrix.len() / a.width {
-        let (x, y) = (a.entries::<R>(row, i), b.entries::<C>(row, j));
+    let (mut at_a, mut at_b) = (a.start + i, b.start + j);
+    while at_a < a.matrix.len() {
+        let (x, y) = (first::<R>(&a.matrix[at_a..]), first::<C>(&b.matrix[at_b..]));
         for (sums, y) in sums.iter_mut().zip(y) {
             for (sum, x) in sums.iter_mut().zip(x) {
                 *sum += x * y;
             }
         }
+        (at_a, at_b) = (at_a + a.width, at_b + b.width);
     }
     for (c, sums) in sums.iter().enumerate() {
         let start = (j + c) * a.len + i;
@@ -69,6 +91,12 @@ fn add_tile<const R: usize, const C: usize>(block: &mut [f64], a: Strip<'_>, b: 
             *h += sum;
         }
     }
+    C
+}
+
+#[inline(always)]
+fn first<const N: usize>(row: &[f64]) -> &[f64; N] {
+    row.first_chunk().expect("a strip lies within its matrix")
 }
 
 /// y += s x.

@@ -1,5 +1,5 @@
 //! Evaluates a graph: costs, and normal equations with the derived nodes substituted.
-use crate::accumulate::{Offset, Run, Scratch, Want, arguments};
+use crate::accumulate::{Arguments, Offset, Run, Scratch, Want};
 use crate::graph::Graph;
 use crate::jacobian::{Jacobian, compact};
 use crate::layout::{Block, Chunk, FunctionPlan, Layout};
@@ -277,8 +277,8 @@ impl Pass<'_> {
             }
         }
         if self.want > Want::Cost {
-            for plan in chunk.functions.iter().rev() {
-                substitute(self.graph, plan, &mut run);
+            for group in chunk.groups.iter().rev() {
+                substitute(group, &mut run);
             }
         }
         data.cost = run.cost;
@@ -292,7 +292,8 @@ impl Pass<'_> {
         let parents = pool.nodes(plan.place as usize);
         let (before, after) = data.derived.split_at_mut(place.start as usize);
         let y = &mut after[..usize::from(place.ambient)];
-        let arguments = arguments(parents, nodes, places, self.values, before);
+        let mut arguments = Arguments::none();
+        arguments.look_up(parents, nodes, places, self.values, before);
         let (x, columns) = (&arguments.x[..parents.len()], &arguments.columns[..parents.len()]);
         if self.want == Want::Cost || place.active == 0 {
             pool.evaluate(plan.place as usize, x, y, None);
@@ -302,8 +303,14 @@ impl Pass<'_> {
         let g = grown(&mut data.scratch.jacobian, rows * arguments.width);
         let jacobian = &mut Jacobian { data: &mut *g, columns, width: arguments.width };
         pool.evaluate(plan.place as usize, x, y, Some(jacobian));
-        compact(g, rows, arguments.width, columns, arguments.active);
-        let len = rows * arguments.active;
-        data.private[plan.jacobian..plan.jacobian + len].copy_from_slice(&g[..len]);
+        compact(g, arguments.width, columns);
+        let mut to = plan.jacobian;
+        for row in g.chunks_exact(arguments.width) {
+            for argument in columns {
+                let from = &row[argument.start..argument.start + argument.active];
+                data.private[to..to + argument.active].copy_from_slice(from);
+                to += argument.active;
+            }
+        }
     }
 }
