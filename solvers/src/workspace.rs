@@ -75,6 +75,36 @@ impl Workspace {
         self.revision == graph.revision
     }
 
+    /// Makes H and b where the nodes are now, as every iteration of a minimiser does once, and returns the cost.
+    ///
+    /// Only for those who bring a minimiser of their own, or want to know how long it takes.
+    pub fn linearize_at(&mut self, graph: &Graph) -> f64 {
+        if !self.fits(graph) {
+            *self = Workspace::new(graph);
+        }
+        self.linearize(graph, &graph.values, Take::All)
+    }
+
+    /// H = Σ ρ' JᵀJ and b = Σ ρ' Jᵀr of the last linearisation, over the free coordinates of the free nodes in order.
+    pub fn normal_equations(&self) -> (DMatrix<f64>, DVector<f64>) {
+        let layout = &self.layout;
+        let n = layout.columns;
+        let (mut h, mut b) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        self.gradient(b.as_mut_slice());
+        for block in &layout.blocks {
+            let active = |node: u32| usize::from(layout.places[node as usize].active);
+            let (rows, row, column) = (active(block.row), layout.column(block.row), layout.column(block.column));
+            let data = self.block(block);
+            for j in 0..active(block.column) {
+                for i in 0..rows {
+                    h[(row + i, column + j)] = data[i + j * rows];
+                    h[(column + j, row + i)] = data[i + j * rows];
+                }
+            }
+        }
+        (h, b)
+    }
+
     /// Sum of ρ/2 over all factors.
     pub(crate) fn cost(&mut self, graph: &Graph, values: &[f64]) -> f64 {
         self.pass(graph, values, Want::Cost, Take::All, None)
