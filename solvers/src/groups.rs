@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Most rows of a group's product: what it reads stays in the cache.
-const ROWS: usize = 256;
+const ROWS: usize = 96;
 
 /// Blocks of a derived node and of what it is tied to.
 pub(crate) struct Ties {
