@@ -1,4 +1,5 @@
 //! One pass over part of a graph: the cost and, if wanted, the normal equations H = Σ JᵀJ and b = Σ Jᵀr.
+use crate::batch::Batch;
 use crate::graph::Node;
 use crate::jacobian::{Columns, Coordinates};
 use crate::pool::MOST;
@@ -56,6 +57,7 @@ pub(crate) enum Want {
 /// Buffers that a pass borrows, so that it allocates nothing once they have grown.
 #[derive(Default)]
 pub(crate) struct Scratch {
+    pub batch: Batch,
     pub jacobian: Vec<f64>,
     pub residual: Vec<f64>,
     pub steps: Vec<Dual>,
@@ -85,40 +87,50 @@ pub(crate) struct Arguments<'a> {
     /// Columns of the full Jacobian, and how many of them are free.
     pub width: usize,
     pub active: usize,
+    /// What was looked up last.
+    ids: [u32; MOST],
 }
 
-/// Looks up where the arguments are stored and which of their coordinates are free.
-#[inline]
-pub(crate) fn arguments<'a>(
-    ids: &[u32],
-    nodes: &'a [Node],
-    places: &[Place],
-    values: &'a [f64],
-    derived: &'a [f64],
-) -> Arguments<'a> {
-    const NOTHING: Columns<'static> = Columns { start: 0, len: 0, free: Coordinates::None };
-    let mut arguments = Arguments { x: [&[]; MOST], columns: [NOTHING; MOST], width: 0, active: 0 };
-    for (k, &id) in ids.iter().enumerate() {
-        let place = &places[id as usize];
-        let store = if place.derived { derived } else { values };
-        let start = place.start as usize;
-        arguments.x[k] = &store[start..start + usize::from(place.ambient)];
-        let free = match &nodes[id as usize].free {
-            _ if place.active == 0 => Coordinates::None,
-            Some(free) if !place.derived => Coordinates::Some(free),
-            _ => Coordinates::All,
-        };
-        arguments.columns[k] = Columns { start: arguments.width, len: usize::from(place.tangent), free };
-        arguments.width += usize::from(place.tangent);
-        arguments.active += usize::from(place.active);
+impl<'a> Arguments<'a> {
+    /// To be filled, and then filled again for the next factor: it is too large to make anew for each.
+    pub fn none() -> Self {
+        const NOTHING: Columns<'static> = Columns { start: 0, len: 0, active: 0, free: Coordinates::None };
+        Arguments { x: [&[]; MOST], columns: [NOTHING; MOST], width: 0, active: 0, ids: [u32::MAX; MOST] }
     }
-    arguments
+
+    /// Looks up where the arguments are stored and which of their coordinates are free.
+    #[inline]
+    pub fn look_up(&mut self, ids: &[u32], nodes: &'a [Node], places: &[Place], values: &'a [f64], derived: &'a [f64]) {
+        (self.width, self.active) = (0, 0);
+        for (((&id, last), x), columns) in ids.iter().zip(&mut self.ids).zip(&mut self.x).zip(&mut self.columns) {
+            // Most arguments of a factor are also those of the one before.
+            if *last == id && columns.start == self.width {
+                self.width += columns.len;
+                self.active += columns.active;
+                continue;
+            }
+            *last = id;
+            let place = &places[id as usize];
+            let store = if place.derived { derived } else { values };
+            let start = place.start as usize;
+            *x = &store[start..start + usize::from(place.ambient)];
+            let free = match &nodes[id as usize].free {
+                _ if place.active == 0 => Coordinates::None,
+                Some(free) if !place.derived => Coordinates::Some(free),
+                _ => Coordinates::All,
+            };
+            let (len, active) = (usize::from(place.tangent), usize::from(place.active));
+            *columns = Columns { start: self.width, len, active, free };
+            self.width += len;
+            self.active += active;
+        }
+    }
 }
 
 impl<'a> Run<'a> {
     #[inline]
-    pub fn arguments(&self, ids: &[u32]) -> Arguments<'a> {
-        arguments(ids, self.nodes, self.places, self.values, self.derived)
+    pub fn look_up(&self, ids: &[u32], arguments: &mut Arguments<'a>) {
+        arguments.look_up(ids, self.nodes, self.places, self.values, self.derived);
     }
 
     /// Passes over the blocks of a factor that adds none.
@@ -133,85 +145,5 @@ impl<'a> Run<'a> {
     pub fn block(&mut self, offset: Offset, len: usize) -> &mut [f64] {
         let arena = if offset.is_shared() { &mut *self.shared } else { &mut *self.private };
         &mut arena[offset.at()..offset.at() + len]
-    }
-}
-
-/// Adds JᵀJ and Jᵀr of one factor. `jacobian` has a row per entry of `r`; argument k's columns begin at `starts[k]`.
-///
-/// The block of nodes (i, j), i <= j, is stored by columns, with i's coordinates as rows.
-#[inline]
-pub(crate) fn accumulate(run: &mut Run<'_>, ids: &[u32], starts: &[usize], r: &[f64], jacobian: &[f64]) {
-    let width = jacobian.len() / r.len();
-    let places = run.places;
-    let dim = |k: usize| usize::from(places[ids[k] as usize].active);
-    let gradient_only = run.want == Want::Gradient;
-    let mut pair = 0;
-    for a in 0..ids.len() {
-        let (ca, da) = (starts[a], dim(a));
-        if da > 0 {
-            let b = run.block(places[ids[a] as usize].gradient, da);
-            for (m, &r) in r.iter().enumerate() {
-                add_scaled(b, r, &jacobian[m * width + ca..m * width + ca + da]);
-            }
-        }
-        if gradient_only {
-            pair += ids.len() - a;
-            continue;
-        }
-        for b in a..ids.len() {
-            let (cb, db) = (starts[b], dim(b));
-            let offset = run.offsets[pair];
-            pair += 1;
-            if da == 0 || db == 0 {
-                continue;
-            }
-            let block = run.block(offset, da * db);
-            // The node with the smaller index has the rows.
-            let (rows, columns) = if ids[a] <= ids[b] { ((ca, da), (cb, db)) } else { ((cb, db), (ca, da)) };
-            add_product(block, rows, columns, r.len(), width, jacobian);
-            if a != b && ids[a] == ids[b] {
-                add_product(block, columns, rows, r.len(), width, jacobian);
-            }
-        }
-    }
-    run.offsets = &run.offsets[pair..];
-}
-
-/// block += Jᵢᵀ Jⱼ, where (start, width) name the columns of J.
-#[inline]
-fn add_product(
-    block: &mut [f64],
-    (ci, di): (usize, usize),
-    (cj, dj): (usize, usize),
-    rows: usize,
-    width: usize,
-    jacobian: &[f64],
-) {
-    if rows == 2 {
-        // Pixels: the case that calibration spends its time in.
-        let (first, second) = jacobian.split_at(width);
-        let (i0, i1) = (&first[ci..ci + di], &second[ci..ci + di]);
-        let (j0, j1) = (&first[cj..cj + dj], &second[cj..cj + dj]);
-        for ((column, &s0), &s1) in block.chunks_exact_mut(di).zip(j0).zip(j1) {
-            for ((h, x), y) in column.iter_mut().zip(i0).zip(i1) {
-                *h += s0 * x + s1 * y;
-            }
-        }
-        return;
-    }
-    for row in jacobian.chunks_exact(width).take(rows) {
-        for (column, &s) in block.chunks_exact_mut(di).zip(&row[cj..cj + dj]) {
-            if s != 0.0 {
-                add_scaled(column, s, &row[ci..ci + di]);
-            }
-        }
-    }
-}
-
-/// y += s x.
-#[inline]
-pub(crate) fn add_scaled(y: &mut [f64], s: f64, x: &[f64]) {
-    for (y, x) in y.iter_mut().zip(x) {
-        *y += s * x;
     }
 }

@@ -54,7 +54,7 @@ impl<'a> Derivative<'a> {
             .map(|&parent| {
                 let len = self.graph.nodes[parent as usize].tangent;
                 width += len;
-                Columns { start: width - len, len, free: Coordinates::All }
+                Columns { start: width - len, len, active: len, free: Coordinates::All }
             })
             .collect();
         let place = &self.graph.nodes[derived.node as usize];

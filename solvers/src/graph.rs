@@ -1,6 +1,6 @@
 //! The factor graph: free, held and derived nodes, and the factors on them.
-use crate::accumulate::add_scaled;
 use crate::pool::{FactorPool, FunctionPool, Pool, PriorPool, squared};
+use crate::product::add_scaled;
 use crate::scalar::{Dual, LANES, derivatives, seed};
 use crate::{Error, Factor, Function, Key, Loss, Noise, Variable, Variables};
 use std::any::TypeId;

@@ -15,17 +15,9 @@ pub(crate) enum Coordinates<'a> {
 pub(crate) struct Columns<'a> {
     pub start: usize,
     pub len: usize,
+    /// How many of them are free.
+    pub active: usize,
     pub free: Coordinates<'a>,
-}
-
-impl Columns<'_> {
-    pub fn active(&self) -> usize {
-        match self.free {
-            Coordinates::None => 0,
-            Coordinates::All => self.len,
-            Coordinates::Some(free) => free.len(),
-        }
-    }
 }
 
 /// Derivatives of a residual, or of the step of a derived node, with respect to the steps of the arguments.
@@ -73,7 +65,7 @@ pub(crate) fn forward<V: Variables>(
     mut call: impl FnMut(V::Over<Dual>, &mut [Dual]),
 ) {
     let columns = jacobian.columns;
-    let directions: usize = columns.iter().map(Columns::active).sum();
+    let directions: usize = columns.iter().map(|argument| argument.active).sum();
     for first in (0..directions.max(1)).step_by(LANES) {
         let arguments = V::seed(x, |k, i| match lane(columns, k, i, first) {
             Some(lane) => seed(0.0, lane),
@@ -92,7 +84,7 @@ pub(crate) fn forward<V: Variables>(
 /// The lane of the k-th argument's i-th coordinate in the pass that begins with direction `first`.
 #[inline]
 fn lane(columns: &[Columns<'_>], k: usize, i: usize, first: usize) -> Option<usize> {
-    let before: usize = columns[..k].iter().map(Columns::active).sum();
+    let before: usize = columns[..k].iter().map(|argument| argument.active).sum();
     let rank = match columns[k].free {
         Coordinates::None => return None,
         Coordinates::All => i,
@@ -106,7 +98,7 @@ fn lane(columns: &[Columns<'_>], k: usize, i: usize, first: usize) -> Option<usi
 fn for_each_free(columns: &[Columns<'_>], first: usize, mut each: impl FnMut(usize, usize)) {
     let mut direction = 0;
     for argument in columns {
-        for rank in 0..argument.active() {
+        for rank in 0..argument.active {
             if (first..first + LANES).contains(&direction) {
                 let coordinate = match argument.free {
                     Coordinates::Some(free) => usize::from(free[rank]),
@@ -119,42 +111,16 @@ fn for_each_free(columns: &[Columns<'_>], first: usize, mut each: impl FnMut(usi
     }
 }
 
-/// Moves the free columns of every row together, so that held coordinates are gone. Returns the new width; `starts`
-/// receives where each argument begins.
+/// Moves the free columns of each argument to where its columns begin, in every row.
 #[inline]
-pub(crate) fn compact(
-    data: &mut [f64],
-    rows: usize,
-    width: usize,
-    columns: &[Columns<'_>],
-    starts: &mut [usize],
-) -> usize {
-    let mut active = 0;
-    for (start, argument) in starts.iter_mut().zip(columns) {
-        *start = active;
-        active += argument.active();
-    }
-    if active == width {
-        return width;
-    }
-    let mut to = 0;
-    for row in 0..rows {
-        for argument in columns {
-            let from = row * width + argument.start;
-            match argument.free {
-                Coordinates::None => {}
-                Coordinates::All => {
-                    data.copy_within(from..from + argument.len, to);
-                    to += argument.len;
-                }
-                Coordinates::Some(free) => {
-                    for &coordinate in free {
-                        data[to] = data[from + usize::from(coordinate)];
-                        to += 1;
-                    }
-                }
+pub(crate) fn compact(data: &mut [f64], width: usize, columns: &[Columns<'_>]) {
+    for argument in columns {
+        let Coordinates::Some(free) = argument.free else { continue };
+        for row in data.chunks_exact_mut(width) {
+            let columns = &mut row[argument.start..argument.start + argument.len];
+            for (to, &coordinate) in free.iter().enumerate() {
+                columns[to] = columns[usize::from(coordinate)];
             }
         }
     }
-    active
 }

@@ -8,6 +8,7 @@
 use crate::accumulate::{Offset, Place};
 use crate::chunks::{Owner, chunks, owners, parents};
 use crate::graph::{Graph, Role};
+use crate::groups::{Group, Ties, groups};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
@@ -45,24 +46,20 @@ pub(crate) struct Chunk {
     pub offsets: Vec<Offset>,
     /// Derived nodes, in order of creation.
     pub functions: Vec<FunctionPlan>,
+    /// The same, as they are substituted.
+    pub groups: Vec<Group>,
     /// Length of the chunk's own arena, and of its derived values.
     pub private: usize,
     pub derived: usize,
 }
 
-/// How one derived node is evaluated and substituted.
+/// How one derived node is evaluated.
 pub(crate) struct FunctionPlan {
     pub pool: u32,
     pub place: u32,
     pub node: u32,
-    /// Its Jacobian G (rows: its step, columns: free coordinates of its parents) in the chunk's arena.
+    /// Where its Jacobian goes in the chunk's arena (see [`crate::groups::Ties`]).
     pub jacobian: usize,
-    /// Its own block of H.
-    pub diagonal: Offset,
-    /// Blocks between its parents: one per pair (a, b) with a <= b, NONE where one is held.
-    pub parents: Vec<Offset>,
-    /// Nodes that it shares factors with: the block with each, and that node's block with each parent.
-    pub neighbours: Vec<(u32, Offset, Vec<Offset>)>,
 }
 
 impl Layout {
@@ -70,8 +67,14 @@ impl Layout {
         let mut places = places(graph);
         let (chunk_of_factor, chunk_of_derived, chunk_count) = chunks(graph);
         let owner = owners(graph, &places, &chunk_of_factor, &chunk_of_derived);
-        let mut builder =
-            Builder { places: &mut places, owner, shared: BTreeMap::new(), shared_len: 0, blocks: Vec::new() };
+        let mut builder = Builder {
+            places: &mut places,
+            owner,
+            shared: BTreeMap::new(),
+            shared_len: 0,
+            blocks: Vec::new(),
+            near: vec![Vec::new(); graph.nodes.len()],
+        };
         for (node, _) in graph.nodes.iter().enumerate() {
             if builder.owner[node] == Owner::Shared && builder.places[node].active > 0 {
                 builder.places[node].gradient = Offset::shared(builder.shared_len);
@@ -159,20 +162,34 @@ struct Builder<'a> {
     shared_len: usize,
     /// Private blocks of all chunks so far.
     blocks: Vec<Block>,
+    /// Of [`Pattern::near`], empty between chunks.
+    near: Vec<Vec<(u32, Offset)>>,
 }
 
-/// Blocks of one chunk, and who is next to whom in them.
-#[derive(Default)]
+/// Blocks of one chunk.
 struct Pattern {
-    offsets: BTreeMap<(u32, u32), Offset>,
-    neighbours: BTreeMap<u32, BTreeSet<u32>>,
+    /// By node: every node that it has a block with, in order, and where that is.
+    near: Vec<Vec<(u32, Offset)>>,
     len: usize,
+}
+
+impl Pattern {
+    fn find(&self, a: u32, b: u32) -> Result<Offset, usize> {
+        let near = &self.near[a as usize];
+        near.binary_search_by_key(&b, |&(other, _)| other).map(|place| near[place].1)
+    }
+
+    fn insert(&mut self, a: u32, b: u32, offset: Offset) {
+        if let Err(place) = self.find(a, b) {
+            self.near[a as usize].insert(place, (b, offset));
+        }
+    }
 }
 
 impl Builder<'_> {
     fn chunk(&mut self, graph: &Graph, index: usize, factors: &[usize], derived: &[usize]) -> Chunk {
         let mut chunk = Chunk::default();
-        let mut pattern = Pattern::default();
+        let mut pattern = Pattern { near: std::mem::take(&mut self.near), len: 0 };
         for &derived in derived {
             let node = graph.derived[derived].node as usize;
             self.places[node].start = chunk.derived as u32;
@@ -190,7 +207,7 @@ impl Builder<'_> {
             touch(graph.derived[derived].node);
             parents(graph, derived as u32).iter().for_each(|&node| touch(node));
         }
-        for node in chunk_nodes {
+        for &node in &chunk_nodes {
             let place = &mut self.places[node as usize];
             if self.owner[node as usize] == Owner::Chunk(index) && place.active > 0 {
                 place.gradient = Offset::private(pattern.len);
@@ -207,51 +224,52 @@ impl Builder<'_> {
             let nodes = graph.factors[pool as usize].nodes(place);
             self.pairs(&mut pattern, nodes, &mut chunk.offsets);
         }
-        let mut plans: Vec<FunctionPlan> =
-            derived.iter().rev().map(|&derived| self.function(graph, derived, &mut pattern)).collect();
-        plans.reverse();
-        chunk.functions = plans;
+        // Derived nodes that were created later are substituted first: what they leave behind is laid out by then.
+        let mut ties = Vec::new();
+        for &derived in derived.iter().rev() {
+            let entry = &graph.derived[derived];
+            let (pool, place, node) = (entry.pool, entry.place, entry.node);
+            chunk.functions.push(FunctionPlan { pool, place, node, jacobian: pattern.len });
+            ties.extend(self.ties(graph, derived, &mut pattern));
+        }
+        chunk.functions.reverse();
+        ties.reverse();
+        chunk.groups = groups(graph, self.places, &ties);
         chunk.private = pattern.len;
-        let private = pattern.offsets.into_iter().filter(|(_, offset)| !offset.is_shared());
-        self.blocks.extend(private.map(|((row, column), offset)| Block { row, column, chunk: index as u32, offset }));
+        for &column in &chunk_nodes {
+            for (row, offset) in pattern.near[column as usize].drain(..) {
+                if row <= column && !offset.is_shared() {
+                    self.blocks.push(Block { row, column, chunk: index as u32, offset });
+                }
+            }
+        }
+        self.near = pattern.near;
         chunk
     }
 
-    fn function(&mut self, graph: &Graph, derived: usize, pattern: &mut Pattern) -> FunctionPlan {
-        let entry = &graph.derived[derived];
-        let (node, nodes) = (entry.node, parents(graph, derived as u32));
-        let mut plan = FunctionPlan {
-            pool: entry.pool,
-            place: entry.place,
-            node,
-            jacobian: pattern.len,
-            diagonal: Offset::NONE,
-            parents: Vec::new(),
-            neighbours: Vec::new(),
-        };
-        if self.places[node as usize].active == 0 {
-            return plan;
+    /// What a derived node is tied to; `None` where it is constant.
+    fn ties(&mut self, graph: &Graph, derived: usize, pattern: &mut Pattern) -> Option<Ties> {
+        let (node, nodes) = (graph.derived[derived].node, parents(graph, derived as u32));
+        let rows = usize::from(self.places[node as usize].active);
+        if rows == 0 {
+            return None;
         }
+        let jacobian = pattern.len;
         let active: usize = nodes.iter().map(|&parent| usize::from(self.places[parent as usize].active)).sum();
-        pattern.len += usize::from(self.places[node as usize].active) * active;
-        plan.diagonal = self.offset(pattern, node, node);
-        // Derived nodes that were created later are substituted first, and no longer matter.
+        pattern.len += rows * active;
+        let diagonal = self.offset(pattern, node, node);
         let remains = |&other: &u32| other < node || !self.places[other as usize].derived;
-        let neighbours: Vec<u32> = pattern
-            .neighbours
-            .get(&node)
-            .into_iter()
-            .flatten()
-            .copied()
-            .filter(|&o| o != node && remains(&o))
-            .collect();
-        self.pairs(pattern, nodes, &mut plan.parents);
-        for other in neighbours {
+        let near = pattern.near[node as usize].iter().map(|&(other, _)| other);
+        let near: Vec<u32> = near.filter(|other| *other != node && remains(other)).collect();
+        let mut parents = Vec::new();
+        self.pairs(pattern, nodes, &mut parents);
+        let mut neighbours = Vec::new();
+        for other in near {
             let own = self.offset(pattern, node, other);
             let with_parents = nodes.iter().map(|&parent| self.offset(pattern, parent, other)).collect();
-            plan.neighbours.push((other, own, with_parents));
+            neighbours.push((other, own, with_parents));
         }
-        plan
+        Some(Ties { derived, node, jacobian, diagonal, parents, neighbours })
     }
 
     fn pairs(&mut self, pattern: &mut Pattern, nodes: &[u32], offsets: &mut Vec<Offset>) {
@@ -268,13 +286,14 @@ impl Builder<'_> {
         if size == 0 {
             return Offset::NONE;
         }
-        let key = (a.min(b), a.max(b));
-        if let Some(&offset) = pattern.offsets.get(&key) {
+        // Nodes with few neighbours, such as those of one sample, tend to be the later ones.
+        let (low, high) = (a.min(b), a.max(b));
+        if let Ok(offset) = pattern.find(high, low) {
             return offset;
         }
         let is_shared = |node: u32| self.owner[node as usize] == Owner::Shared;
         let offset = if is_shared(a) && is_shared(b) {
-            *self.shared.entry(key).or_insert_with(|| {
+            *self.shared.entry((low, high)).or_insert_with(|| {
                 self.shared_len += size;
                 Offset::shared(self.shared_len - size)
             })
@@ -282,9 +301,8 @@ impl Builder<'_> {
             pattern.len += size;
             Offset::private(pattern.len - size)
         };
-        pattern.offsets.insert(key, offset);
-        pattern.neighbours.entry(a).or_default().insert(b);
-        pattern.neighbours.entry(b).or_default().insert(a);
+        pattern.insert(high, low, offset);
+        pattern.insert(low, high, offset);
         offset
     }
 }

@@ -73,6 +73,7 @@ impl LevenbergMarquardt {
         workspace.diagonal(diagonal);
         largest_diagonal.copy_from_slice(diagonal);
         let (mut lambda, mut nu) = (self.initial_damping, 2.0);
+        let mut as_predicted = false;
         let mut iterations = 0;
         let termination = loop {
             let floor = SMALLEST_DIAGONAL * diagonal.iter().fold(1e-300, |most: f64, d| most.max(*d));
@@ -100,8 +101,11 @@ impl LevenbergMarquardt {
                 if largest <= self.step_tolerance {
                     break Termination::StepTolerance;
                 }
-                let trial_cost = workspace.cost(graph, trial);
                 let predicted: f64 = step.iter().zip(&*damping).zip(&*b).map(|((s, d), b)| 0.5 * s * (d * s - b)).sum();
+                // A step that is likely to be taken, and not to be the last, is linearised at once: its cost comes along.
+                let at_once = as_predicted && predicted > self.cost_tolerance * cost;
+                let trial_cost =
+                    if at_once { workspace.linearize(graph, trial, Take::All) } else { workspace.cost(graph, trial) };
                 let gain = (cost - trial_cost) / predicted;
                 if trial_cost < cost && gain > 0.0 {
                     std::mem::swap(&mut graph.values, trial);
@@ -113,14 +117,21 @@ impl LevenbergMarquardt {
                     if decrease <= self.cost_tolerance {
                         break Termination::CostTolerance;
                     }
-                    cost = workspace.linearize(graph, &graph.values, Take::All);
+                    if !at_once {
+                        workspace.linearize(graph, &graph.values, Take::All);
+                    }
                     workspace.gradient(b);
                     workspace.diagonal(diagonal);
+                    as_predicted = gain > 0.5;
                     lambda *= (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 3.0);
                     nu = 2.0;
                     continue;
                 }
+                if at_once {
+                    workspace.linearize(graph, &graph.values, Take::All);
+                }
             }
+            as_predicted = false;
             lambda *= nu;
             nu *= 2.0;
             if lambda > LARGEST_DAMPING {

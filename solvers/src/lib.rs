@@ -2,6 +2,7 @@
 //!
 //! Knows no robot, no camera and no file: see the crate `handeye` for those.
 mod accumulate;
+mod batch;
 pub mod check;
 mod chunks;
 mod covariance;
@@ -12,6 +13,7 @@ mod factor;
 mod gauss_newton;
 mod graduated;
 mod graph;
+mod groups;
 mod jacobian;
 mod layout;
 mod lbfgs;
@@ -22,6 +24,7 @@ pub mod manifold;
 mod minibatches;
 mod noise;
 mod pool;
+mod product;
 mod report;
 pub mod scalar;
 mod substitute;

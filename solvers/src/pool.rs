@@ -1,5 +1,5 @@
 //! Factors and functions of one type side by side, behind one call per run of them.
-use crate::accumulate::{Run, Want, accumulate};
+use crate::accumulate::{Arguments, Run, Want};
 use crate::jacobian::{Jacobian, compact, forward};
 use crate::scalar::Dual;
 use crate::{Factor, Function, Loss, Noise, Variable, Variables};
@@ -77,23 +77,25 @@ impl<F: Factor<M>, const M: usize> FactorPool for Pool<F, M> {
     }
 
     fn run(&self, range: Range<usize>, run: &mut Run<'_>) {
-        let mut jacobian = std::mem::take(&mut run.scratch.jacobian);
+        let mut batch = std::mem::take(&mut run.scratch.batch);
+        let mut arguments = Arguments::none();
         for placed in &self.placed[range] {
             let nodes = placed.nodes.as_ref();
-            let arguments = run.arguments(nodes);
+            run.look_up(nodes, &mut arguments);
             let (x, columns) = (&arguments.x[..nodes.len()], &arguments.columns[..nodes.len()]);
             if run.want == Want::Cost || arguments.active == 0 {
+                batch.flush(run);
                 let mut r = placed.factor.evaluate(x, None);
                 placed.noise.whiten(&mut r, None);
                 run.cost += 0.5 * placed.loss.evaluate(squared(&r), run.graduation).0;
                 run.skip(nodes.len());
                 continue;
             }
-            let data = grown(&mut jacobian, M * arguments.width);
+            let data = batch.room(run, nodes, &arguments, M);
             let mut r =
                 placed.factor.evaluate(x, Some(&mut Jacobian { data: &mut *data, columns, width: arguments.width }));
-            let mut starts = [0; MOST];
-            let width = compact(data, M, arguments.width, columns, &mut starts);
+            let width = arguments.width;
+            compact(data, width, columns);
             placed.noise.whiten(&mut r, Some((&mut *data, width)));
             let (rho, slope) = placed.loss.evaluate(squared(&r), run.graduation);
             run.cost += 0.5 * rho;
@@ -102,9 +104,10 @@ impl<F: Factor<M>, const M: usize> FactorPool for Pool<F, M> {
                 r.iter_mut().for_each(|x| *x *= root);
                 data[..M * width].iter_mut().for_each(|x| *x *= root);
             }
-            accumulate(run, nodes, &starts, &r, &data[..M * width]);
+            batch.push(nodes, &arguments, &r);
         }
-        run.scratch.jacobian = jacobian;
+        batch.flush(run);
+        run.scratch.batch = batch;
     }
 
     fn as_any_mut(&mut self) -> &mut dyn Any {
@@ -184,21 +187,23 @@ impl<V: Variable<Over<f64> = V>> FactorPool for PriorPool<V> {
     }
 
     fn run(&self, range: Range<usize>, run: &mut Run<'_>) {
-        let mut jacobian = std::mem::take(&mut run.scratch.jacobian);
+        let mut batch = std::mem::take(&mut run.scratch.batch);
         let mut residual = std::mem::take(&mut run.scratch.residual);
         let mut steps = std::mem::take(&mut run.scratch.steps);
+        let mut arguments = Arguments::none();
         for prior in &self.placed[range] {
-            let arguments = run.arguments(&prior.node);
+            run.look_up(&prior.node, &mut arguments);
             let rows = prior.weights.len();
             let r = grown(&mut residual, rows);
             self.whitened(prior, arguments.x[0], r);
             run.cost += 0.5 * squared(r);
             if run.want == Want::Cost || arguments.active == 0 {
+                batch.flush(run);
                 run.skip(1);
                 continue;
             }
             let columns = &arguments.columns[..1];
-            let data = grown(&mut jacobian, rows * arguments.width);
+            let data = batch.room(run, &prior.node, &arguments, rows);
             steps.resize(rows, Dual::from(0.0));
             forward::<(V,)>(
                 &arguments.x[..1],
@@ -206,14 +211,15 @@ impl<V: Variable<Over<f64> = V>> FactorPool for PriorPool<V> {
                 &mut steps,
                 |(y,), steps| V::local(&prior.mean, &y, steps),
             );
-            let mut starts = [0; MOST];
-            let width = compact(data, rows, arguments.width, columns, &mut starts);
+            let width = arguments.width;
+            compact(data, width, columns);
             for (row, w) in prior.weights.iter().enumerate() {
                 data[row * width..(row + 1) * width].iter_mut().for_each(|x| *x *= w);
             }
-            accumulate(run, &prior.node, &starts, r, &data[..rows * width]);
+            batch.push(&prior.node, &arguments, r);
         }
-        run.scratch.jacobian = jacobian;
+        batch.flush(run);
+        run.scratch.batch = batch;
         run.scratch.residual = residual;
         run.scratch.steps = steps;
     }

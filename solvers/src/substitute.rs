@@ -1,145 +1,106 @@
 //! Substitutes derived nodes: what factors say of one is moved to what it is derived from.
-use crate::accumulate::{Offset, Run, Want, add_scaled};
-use crate::graph::Graph;
-use crate::layout::FunctionPlan;
+use crate::accumulate::{Run, Want};
+use crate::groups::{Group, Member, Target, Way};
 use crate::pool::grown;
+use crate::product::{Strip, add_product, add_scaled};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, MatMut, MatRef, Par};
+use std::ops::Range;
 
-/// Moves all that H and b say of a derived node d = f(P) to its parents P, with G = ∂d/∂P:
+/// Moves all that H and b say of derived nodes d = f(P) to their parents P, with G = ∂d/∂P:
 ///
 ///   b_P += Gᵀ b_d      H_PP += Gᵀ H_dd G      H_Px += Gᵀ H_dx for every other node x
 ///
-/// and, where x is itself a parent, H_xx += Gᵀ H_dx + H_xd G.
-pub(crate) fn substitute(graph: &Graph, plan: &FunctionPlan, run: &mut Run<'_>) {
-    let places = run.places;
-    let place = &places[plan.node as usize];
-    let rows = usize::from(place.active);
-    if rows == 0 {
+/// and, where x is itself a parent, H_xx += Gᵀ H_dx + H_xd G. With S = [H_dd G, H_dx, ...], all of H is Gᵀ S; where parents
+/// are common to a group of derived nodes, the G and the S of all of them stand below each other in one product.
+pub(crate) fn substitute(group: &Group, run: &mut Run<'_>) {
+    for member in &group.members {
+        substitute_gradient(group, member, run);
+    }
+    if run.want < Want::Equations {
         return;
     }
-    let parents = graph.functions[plan.pool as usize].nodes(plan.place as usize);
-    let dim = |node: u32| usize::from(places[node as usize].active);
-    let width: usize = parents.iter().map(|&parent| dim(parent)).sum();
+    let &Group { rows, width, columns, .. } = group;
     let mut scratch = std::mem::take(&mut run.scratch.product);
-    let needed = 2 * rows * width + rows * rows + rows;
-    let (g, rest) = grown(&mut scratch, needed).split_at_mut(rows * width);
-    let (product, rest) = rest.split_at_mut(rows * width);
-    let (h, b) = rest.split_at_mut(rows * rows);
-    g.copy_from_slice(&run.private[plan.jacobian..plan.jacobian + rows * width]);
-    h.copy_from_slice(run.block(plan.diagonal, rows * rows));
-    b.copy_from_slice(run.block(place.gradient, rows));
+    let stacked = rows * group.members.len();
+    let (g, rest) = grown(&mut scratch, stacked * (width + columns) + width * columns).split_at_mut(stacked * width);
+    let (s, product) = rest.split_at_mut(stacked * columns);
+    s.fill(0.0);
+    for ((member, g), s) in
+        group.members.iter().zip(g.chunks_exact_mut(rows * width)).zip(s.chunks_exact_mut(rows * columns))
+    {
+        gather(group, member, run, g, s);
+        multiply(group, &group.own, g, s, product);
+        scatter(&member.targets, &group.own, product, run);
+    }
+    multiply(group, &group.common, g, s, product);
+    scatter(&group.targets, &group.common, product, run);
+    run.scratch.product = scratch;
+}
 
-    let mut start = 0;
-    for &parent in parents {
-        let columns = dim(parent);
-        if columns > 0 {
-            let gradient = run.block(places[parent as usize].gradient, columns);
-            for (g, &b) in g.chunks_exact(width).zip(&*b) {
-                add_scaled(gradient, b, &g[start..start + columns]);
-            }
-        }
-        start += columns;
-    }
-    if run.want == Want::Gradient {
-        run.scratch.product = scratch;
-        return;
-    }
-    // product = H_dd G, by rows.
-    product.fill(0.0);
-    for (i, row) in product.chunks_exact_mut(width).enumerate() {
-        for (k, g) in g.chunks_exact(width).enumerate() {
-            add_scaled(row, h[i + k * rows], g);
-        }
-    }
-    let mut pair = 0;
-    let mut start_a = 0;
-    for (a, &first) in parents.iter().enumerate() {
-        let da = dim(first);
-        let mut start_b = start_a;
-        for &second in &parents[a..] {
-            let (db, offset) = (dim(second), plan.parents[pair]);
-            pair += 1;
-            if offset != Offset::NONE {
-                let block = run.block(offset, da * db);
-                let (ga, pb) = ((&*g, start_a, da), (&*product, start_b, db));
-                let (pa, gb) = ((&*product, start_a, da), (&*g, start_b, db));
-                if first <= second {
-                    add_product_of(block, ga, width, pb, width, rows);
-                } else {
-                    add_product_of(block, gb, width, pa, width, rows);
-                }
-                if first == second && start_a != start_b {
-                    add_product_of(block, gb, width, pa, width, rows);
-                }
-            }
-            start_b += db;
-        }
-        start_a += da;
-    }
-    for (other, own, with_parents) in &plan.neighbours {
-        substitute_neighbour(graph, plan, (*other, *own), with_parents, g, width, run);
+/// b_P += Gᵀ b_d.
+fn substitute_gradient(group: &Group, member: &Member, run: &mut Run<'_>) {
+    let &Group { rows, width, .. } = group;
+    let mut scratch = std::mem::take(&mut run.scratch.product);
+    let (g, b) = grown(&mut scratch, rows * (width + 1)).split_at_mut(rows * width);
+    g.copy_from_slice(&run.private[member.jacobian..member.jacobian + rows * width]);
+    b[..rows].copy_from_slice(run.block(member.gradient, rows));
+    for &(gradient, span) in &member.parents {
+        let strip = Strip { matrix: g, width, start: span.start, len: span.len };
+        add_product(run.block(gradient, span.len), strip, Strip { matrix: &b[..rows], width: 1, start: 0, len: 1 });
     }
     run.scratch.product = scratch;
 }
 
-/// H_Px += Gᵀ H_dx for one node x.
-fn substitute_neighbour(
-    graph: &Graph,
-    plan: &FunctionPlan,
-    (other, own): (u32, Offset),
-    with_parents: &[Offset],
-    g: &[f64],
-    width: usize,
-    run: &mut Run<'_>,
-) {
-    let places = run.places;
-    let dim = |node: u32| usize::from(places[node as usize].active);
-    let (rows, columns) = (dim(plan.node), dim(other));
-    let parents = graph.functions[plan.pool as usize].nodes(plan.place as usize);
-    let mut s = std::mem::take(&mut run.scratch.residual);
-    // s = H_dx by rows, whichever of the two has the rows of the stored block.
-    let s_rows = grown(&mut s, rows * columns);
-    let block = run.block(own, rows * columns);
-    for i in 0..rows {
-        for j in 0..columns {
-            s_rows[i * columns + j] = if plan.node < other { block[i + j * rows] } else { block[j + i * columns] };
+/// Fills G and S of one derived node, both by rows.
+fn gather(group: &Group, member: &Member, run: &mut Run<'_>, g: &mut [f64], s: &mut [f64]) {
+    let &Group { rows, width, columns, .. } = group;
+    g.copy_from_slice(&run.private[member.jacobian..member.jacobian + rows * width]);
+    let h = run.block(member.diagonal, rows * rows);
+    for (i, s) in s.chunks_exact_mut(columns).enumerate() {
+        for (k, g) in g.chunks_exact(width).enumerate() {
+            add_scaled(&mut s[..width], h[i + k * rows], g);
         }
     }
-    let mut start = 0;
-    for (&parent, &offset) in parents.iter().zip(with_parents) {
-        let d = dim(parent);
-        if offset != Offset::NONE {
-            let block = run.block(offset, d * columns);
-            let (gp, sx) = ((g, start, d), (&*s_rows, 0, columns));
-            if parent <= other {
-                add_product_of(block, gp, width, sx, columns, rows);
-            }
-            if parent >= other {
-                add_product_of(block, sx, columns, gp, width, rows);
+    for source in &member.sources {
+        let len = source.columns.len;
+        let block = run.block(source.block, rows * len);
+        for (i, s) in s.chunks_exact_mut(columns).enumerate() {
+            for (j, s) in s[source.columns.start..][..len].iter_mut().enumerate() {
+                *s = if source.transposed { block[j + i * len] } else { block[i + j * rows] };
             }
         }
-        start += d;
     }
-    run.scratch.residual = s;
 }
 
-/// Columns `start..start + len` of a matrix stored by rows: (matrix, start, len).
-type Slice<'a> = (&'a [f64], usize, usize);
+/// Gᵀ S by columns, for some columns of G.
+fn multiply(group: &Group, of: &Range<usize>, g: &[f64], s: &[f64], product: &mut [f64]) {
+    if of.is_empty() {
+        return;
+    }
+    let g = MatRef::from_row_major_slice(g, g.len() / group.width, group.width).subcols(of.start, of.len());
+    let s = MatRef::from_row_major_slice(s, s.len() / group.columns, group.columns);
+    let product = &mut product[..of.len() * group.columns];
+    let product = MatMut::from_column_major_slice_mut(product, of.len(), group.columns);
+    matmul(product, Accum::Replace, g.transpose(), s, 1.0, Par::Seq);
+}
 
-/// block += Aᵀ B; the block is stored by columns, with A's columns as rows.
-#[inline]
-fn add_product_of(
-    block: &mut [f64],
-    (a, start_a, da): Slice<'_>,
-    width_a: usize,
-    (b, start_b, db): Slice<'_>,
-    width_b: usize,
-    rows: usize,
-) {
-    for i in 0..rows {
-        let a = &a[i * width_a + start_a..i * width_a + start_a + da];
-        let b = &b[i * width_b + start_b..i * width_b + start_b + db];
-        for (column, &s) in block.chunks_exact_mut(da).zip(b) {
-            add_scaled(column, s, a);
+/// Adds the parts of a product to their blocks.
+fn scatter(targets: &[Target], of: &Range<usize>, product: &[f64], run: &mut Run<'_>) {
+    for target in targets {
+        let (rows, columns) = (target.rows.len, target.columns.len);
+        let block = run.block(target.block, rows * columns);
+        for j in 0..columns {
+            let start = (target.columns.start + j) * of.len() + target.rows.start - of.start;
+            let from = &product[start..start + rows];
+            if target.way != Way::Transposed {
+                add_scaled(&mut block[j * rows..(j + 1) * rows], 1.0, from);
+            }
+            if target.way != Way::AsItIs {
+                for (i, from) in from.iter().enumerate() {
+                    block[j + i * columns] += from;
+                }
+            }
         }
     }
 }

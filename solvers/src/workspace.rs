@@ -1,9 +1,10 @@
 //! Evaluates a graph: costs, and normal equations with the derived nodes substituted.
-use crate::accumulate::{Offset, Run, Scratch, Want, add_scaled, arguments};
+use crate::accumulate::{Arguments, Offset, Run, Scratch, Want};
 use crate::graph::Graph;
 use crate::jacobian::{Jacobian, compact};
 use crate::layout::{Block, Chunk, FunctionPlan, Layout};
-use crate::pool::{MOST, grown};
+use crate::pool::grown;
+use crate::product::add_scaled;
 use crate::substitute::substitute;
 use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
@@ -74,6 +75,36 @@ impl Workspace {
         self.revision == graph.revision
     }
 
+    /// Makes H and b where the nodes are now, as every iteration of a minimiser does once, and returns the cost.
+    ///
+    /// Only for those who bring a minimiser of their own, or want to know how long it takes.
+    pub fn linearize_at(&mut self, graph: &Graph) -> f64 {
+        if !self.fits(graph) {
+            *self = Workspace::new(graph);
+        }
+        self.linearize(graph, &graph.values, Take::All)
+    }
+
+    /// H = Σ ρ' JᵀJ and b = Σ ρ' Jᵀr of the last linearisation, over the free coordinates of the free nodes in order.
+    pub fn normal_equations(&self) -> (DMatrix<f64>, DVector<f64>) {
+        let layout = &self.layout;
+        let n = layout.columns;
+        let (mut h, mut b) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        self.gradient(b.as_mut_slice());
+        for block in &layout.blocks {
+            let active = |node: u32| usize::from(layout.places[node as usize].active);
+            let (rows, row, column) = (active(block.row), layout.column(block.row), layout.column(block.column));
+            let data = self.block(block);
+            for j in 0..active(block.column) {
+                for i in 0..rows {
+                    h[(row + i, column + j)] = data[i + j * rows];
+                    h[(column + j, row + i)] = data[i + j * rows];
+                }
+            }
+        }
+        (h, b)
+    }
+
     /// Sum of ρ/2 over all factors.
     pub(crate) fn cost(&mut self, graph: &Graph, values: &[f64]) -> f64 {
         self.pass(graph, values, Want::Cost, Take::All, None)
@@ -101,14 +132,21 @@ impl Workspace {
             pass.run(&layout.chunks[0], data, &mut self.shared);
             return data.cost;
         }
+        let run = |((chunk, data), shared): ((&Chunk, &mut ChunkData), &mut Vec<f64>)| {
+            if derivatives {
+                shared.fill(0.0);
+            }
+            pass.run(chunk, data, shared);
+        };
+        // Handing work to another thread and waiting for it is for nothing where there is only one.
+        let alone = rayon::current_num_threads() == 1;
         for (chunks, data) in layout.chunks.chunks(WAVE).zip(self.chunks.chunks_mut(WAVE)) {
             let copies = &mut self.wave[..chunks.len()];
-            chunks.par_iter().zip(data).zip(&mut *copies).with_max_len(1).for_each(|((chunk, data), shared)| {
-                if derivatives {
-                    shared.fill(0.0);
-                }
-                pass.run(chunk, data, shared);
-            });
+            if alone {
+                chunks.iter().zip(data).zip(&mut *copies).for_each(run);
+            } else {
+                chunks.par_iter().zip(data).zip(&mut *copies).with_max_len(1).for_each(run);
+            }
             if derivatives {
                 for copy in copies {
                     add_scaled(&mut self.shared, 1.0, copy);
@@ -269,8 +307,8 @@ impl Pass<'_> {
             }
         }
         if self.want > Want::Cost {
-            for plan in chunk.functions.iter().rev() {
-                substitute(self.graph, plan, &mut run);
+            for group in chunk.groups.iter().rev() {
+                substitute(group, &mut run);
             }
         }
         data.cost = run.cost;
@@ -284,7 +322,8 @@ impl Pass<'_> {
         let parents = pool.nodes(plan.place as usize);
         let (before, after) = data.derived.split_at_mut(place.start as usize);
         let y = &mut after[..usize::from(place.ambient)];
-        let arguments = arguments(parents, nodes, places, self.values, before);
+        let mut arguments = Arguments::none();
+        arguments.look_up(parents, nodes, places, self.values, before);
         let (x, columns) = (&arguments.x[..parents.len()], &arguments.columns[..parents.len()]);
         if self.want == Want::Cost || place.active == 0 {
             pool.evaluate(plan.place as usize, x, y, None);
@@ -294,7 +333,14 @@ impl Pass<'_> {
         let g = grown(&mut data.scratch.jacobian, rows * arguments.width);
         let jacobian = &mut Jacobian { data: &mut *g, columns, width: arguments.width };
         pool.evaluate(plan.place as usize, x, y, Some(jacobian));
-        let len = rows * compact(g, rows, arguments.width, columns, &mut [0; MOST]);
-        data.private[plan.jacobian..plan.jacobian + len].copy_from_slice(&g[..len]);
+        compact(g, arguments.width, columns);
+        let mut to = plan.jacobian;
+        for row in g.chunks_exact(arguments.width) {
+            for argument in columns {
+                let from = &row[argument.start..argument.start + argument.active];
+                data.private[to..to + argument.active].copy_from_slice(from);
+                to += argument.active;
+            }
+        }
     }
 }

@@ -50,12 +50,13 @@ impl Factor<2> for Reprojection {
         };
         let coefficients = self.model.distortion().len();
         let bends = (0..coefficients).any(|k| jacobian.wanted_coordinate(4, 4 + k));
-        let (seen, by_point, by_distortion) = if bends {
-            lens::<11>(self.model, distortion, &in_camera)
-        } else if coefficients > 0 {
-            lens::<3>(self.model, distortion, &in_camera)
+        let mut by_distortion = [[0.0; 8]; 2];
+        let (seen, by_point) = if bends {
+            let (seen, slopes) = lens::<11>(self.model, distortion, &in_camera);
+            by_distortion = slopes.map(|slope| std::array::from_fn(|k| slope[3 + k]));
+            (seen, slopes.map(|slope| [slope[0], slope[1], slope[2]]))
         } else {
-            lens::<3>(self.model, &[], &in_camera)
+            lens::<3>(self.model, &distortion[..coefficients], &in_camera)
         };
         for (row, focal) in [fx, fy].into_iter().enumerate() {
             let [a, b, c] = by_point[row].map(|slope| focal * slope);
@@ -76,11 +77,13 @@ impl Factor<2> for Reprojection {
             }
             if jacobian.wanted(4) {
                 let columns = jacobian.row(row, 4);
-                columns[..4].fill(0.0);
+                columns.copy_from_slice(&[0.0; PARAMETERS]);
                 columns[row] = seen[row];
                 columns[2 + row] = 1.0;
-                for (column, slope) in columns[4..].iter_mut().zip(by_distortion[row]) {
-                    *column = focal * slope;
+                if bends {
+                    for (column, slope) in columns[4..].iter_mut().zip(by_distortion[row]) {
+                        *column = focal * slope;
+                    }
                 }
             }
         }
@@ -90,23 +93,18 @@ impl Factor<2> for Reprojection {
 
 /// The lens and its derivatives by the point and, where `N` is 11, by the distortion coefficients.
 #[inline]
-fn lens<const N: usize>(
-    model: CameraModel,
-    distortion: &[f64],
-    in_camera: &Vector3<f64>,
-) -> ([f64; 2], [[f64; 3]; 2], [[f64; 8]; 2]) {
+fn lens<const N: usize>(model: CameraModel, distortion: &[f64], in_camera: &Vector3<f64>) -> ([f64; 2], [[f64; N]; 2]) {
     let point = Vector3::new(seed::<N>(in_camera.x, 0), seed::<N>(in_camera.y, 1), seed::<N>(in_camera.z, 2));
-    let mut coefficients = [Dual::<N>::from(0.0); 8];
-    for (k, (lifted, &value)) in coefficients.iter_mut().zip(distortion).enumerate() {
-        *lifted = if N == 11 { seed::<N>(value, 3 + k) } else { Dual::from(value) };
-    }
-    let lifted = model.lens(&coefficients, &point);
-    let slopes = lifted.map(|value| derivatives(&value));
-    (
-        lifted.map(|value| value.value()),
-        slopes.map(|slope| [slope[0], slope[1], slope[2]]),
-        slopes.map(|slope| std::array::from_fn(|k| if N == 11 { slope[(3 + k) % N] } else { 0.0 })),
-    )
+    let lifted = if distortion.is_empty() {
+        model.lens(&[], &point)
+    } else {
+        let mut coefficients = [Dual::<N>::from(0.0); 8];
+        for (k, (lifted, &value)) in coefficients.iter_mut().zip(distortion).enumerate() {
+            *lifted = if N == 11 { seed::<N>(value, 3 + k) } else { Dual::from(value) };
+        }
+        model.lens(&coefficients, &point)
+    };
+    (lifted.map(|value| value.value()), lifted.map(|value| derivatives(&value)))
 }
 
 #[inline]

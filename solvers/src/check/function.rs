@@ -120,7 +120,12 @@ fn layout<'a>(stored: &[(Vec<f64>, usize)], free: &[Coordinates<'a>]) -> (Vec<Co
         .zip(free)
         .map(|(&(_, len), &free)| {
             width += len;
-            Columns { start: width - len, len, free }
+            let active = match free {
+                Coordinates::None => 0,
+                Coordinates::All => len,
+                Coordinates::Some(free) => free.len(),
+            };
+            Columns { start: width - len, len, active, free }
         })
         .collect();
     (columns, width)

@@ -3,7 +3,7 @@ use super::differences::derivative;
 use super::{Agreement, Comparison, Mismatch};
 use crate::graph::{Graph, Role};
 use crate::pool::squared;
-use crate::workspace::{Take, Workspace};
+use crate::workspace::Workspace;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
@@ -13,8 +13,8 @@ use std::collections::BTreeMap;
 /// columns of a mismatch are those of the system: the free coordinates of the free nodes, in order.
 pub fn graph(graph: &Graph) -> Result<Agreement, Mismatch> {
     let mut workspace = Workspace::new(graph);
-    workspace.linearize(graph, &graph.values, Take::All);
-    let (found_h, found_b) = dense(&workspace);
+    workspace.linearize_at(graph);
+    let (found_h, found_b) = workspace.normal_equations();
     let (jacobian, errors, residual) = differences(graph, &workspace);
     let (h, b) = (jacobian.tr_mul(&jacobian), jacobian.tr_mul(&residual));
     let mut comparison = Comparison::default();
@@ -28,26 +28,6 @@ pub fn graph(graph: &Graph) -> Result<Agreement, Mismatch> {
         }
     }
     comparison.finish()
-}
-
-/// H and b of a linearised workspace.
-fn dense(workspace: &Workspace) -> (DMatrix<f64>, DVector<f64>) {
-    let layout = &workspace.layout;
-    let n = layout.columns;
-    let (mut h, mut b) = (DMatrix::zeros(n, n), DVector::zeros(n));
-    workspace.gradient(b.as_mut_slice());
-    for block in &layout.blocks {
-        let active = |node: u32| usize::from(layout.places[node as usize].active);
-        let (rows, row, column) = (active(block.row), layout.column(block.row), layout.column(block.column));
-        let data = workspace.block(block);
-        for j in 0..active(block.column) {
-            for i in 0..rows {
-                h[(row + i, column + j)] = data[i + j * rows];
-                h[(column + j, row + i)] = data[i + j * rows];
-            }
-        }
-    }
-    (h, b)
 }
 
 /// J by differences, the error of each of its columns, and the residuals, all with the root of ρ' where they are.

@@ -7,6 +7,7 @@ use super::independent::independent;
 use super::{LinearSolver, scatter_lower};
 use crate::Workspace;
 use crate::layout::Block;
+use crate::product::add_scaled;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, MatMut, MatRef, Par};
 use std::ops::Range;
@@ -139,7 +140,7 @@ impl Schur {
                 let (before, row) = rows.split_at_mut(i * n);
                 let row = &mut row[..n];
                 for j in 0..i {
-                    crate::accumulate::add_scaled(row, -l[i + j * m], &before[j * n..(j + 1) * n]);
+                    add_scaled(row, -l[i + j * m], &before[j * n..(j + 1) * n]);
                 }
                 let inverse = 1.0 / l[i * (m + 1)];
                 row.iter_mut().for_each(|x| *x *= inverse);
@@ -225,7 +226,7 @@ impl Schur {
         for i in 0..m {
             let known: f64 = (0..i).map(|j| l[i + j * m] * own[j]).sum();
             own[i] = (own[i] - known) / l[i * (m + 1)];
-            crate::accumulate::add_scaled(&mut self.reduced_y, -own[i], &self.v[(k * m + i) * n..][..n]);
+            add_scaled(&mut self.reduced_y, -own[i], &self.v[(k * m + i) * n..][..n]);
         }
     }
 
