@@ -8,8 +8,8 @@ const LONGEST: usize = 64;
 
 /// Consecutive factors of one pool whose Jacobians have the same columns.
 ///
-/// The pixels that one camera saw in one sample share the tip, the camera and its intrinsics, and differ in the feature:
-/// the blocks of H between what they share take the rows of all of them in one product.
+/// Observations of one kind made at one moment tend to share all nodes but one: the blocks of H between what they share take
+/// the rows of all of them in one product.
 #[derive(Default)]
 pub(crate) struct Batch {
     /// The nodes of each factor in turn.

@@ -1,7 +1,7 @@
 //! Finds derived nodes that are substituted together, and lays out where their products go.
 //!
-//! The tips of many samples come from one base and one chain, each with joints of its own. What factors say of the tips
-//! is moved to base and chain by one large product over all of them, and to each sample's joints by a small one.
+//! Many derived nodes often share some parents and each have others of their own, one set per moment. What factors say of
+//! them is moved to the shared parents by one large product over all of them, and to each one's own by a small one.
 use crate::accumulate::{Offset, Place};
 use crate::chunks::parents;
 use crate::graph::Graph;

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 const LARGEST: usize = 16;
 
 /// Nodes of one size that no block ties to each other, as (size, nodes in ascending order), for the size where they have
-/// most columns. Nodes with few neighbours are taken first: samples before the cameras that all of them share.
+/// most columns. Nodes with few neighbours are taken first: one per moment before those that all moments share.
 pub(super) fn independent(layout: &Layout) -> Option<(usize, Vec<u32>)> {
     let active = |node: u32| usize::from(layout.places[node as usize].active);
     let mut neighbours: Vec<Vec<u32>> = vec![Vec::new(); layout.places.len()];
