@@ -41,7 +41,7 @@ pub(crate) fn add_product(block: &mut [f64], a: Strip<'_>, b: Strip<'_>) {
 #[inline]
 fn add_band<const R: usize>(block: &mut [f64], a: Strip<'_>, b: Strip<'_>, i: usize) -> usize {
     if a.matrix.len() == 2 * a.width {
-        add_pixel(block, a, b, i, [first::<R>(a.row(0, i)), first::<R>(a.row(1, i))]);
+        add_two_rows(block, a, b, i, [first::<R>(a.row(0, i)), first::<R>(a.row(1, i))]);
         return R;
     }
     let mut j = 0;
@@ -57,7 +57,7 @@ fn add_band<const R: usize>(block: &mut [f64], a: Strip<'_>, b: Strip<'_>, i: us
 
 /// A band of a product of two rows, which is what one pixel makes.
 #[inline(always)]
-fn add_pixel<const R: usize>(block: &mut [f64], a: Strip<'_>, b: Strip<'_>, i: usize, [x, y]: [&[f64; R]; 2]) {
+fn add_two_rows<const R: usize>(block: &mut [f64], a: Strip<'_>, b: Strip<'_>, i: usize, [x, y]: [&[f64; R]; 2]) {
     for ((column, s), t) in block.chunks_exact_mut(a.len).zip(b.row(0, 0)).zip(b.row(1, 0)) {
         for ((h, x), y) in column[i..i + R].iter_mut().zip(x).zip(y) {
             *h += s * x + t * y;
