@@ -23,10 +23,10 @@ pub(crate) fn finish(
     deviations: Deviations,
 ) -> Calibration {
     let distances = distances(setup, state);
-    let links: Vec<Vec<Pose>> = setup.joints.iter().map(|joints| state.model.links(joints)).collect();
+    let links: Vec<Vec<Pose>> = state.all_links(setup);
     let mut of_camera: Vec<Vec<(f64, bool)>> = vec![Vec::new(); setup.rig.cameras.len()];
     let mut left_out = vec![0; setup.rig.cameras.len()];
-    let mut used_samples = vec![false; setup.joints.len()];
+    let mut used_samples = vec![false; setup.len()];
     for ((seen, distance), active) in setup.observations.iter().zip(&distances).zip(&verdict.active) {
         if *active {
             let point = state.model.in_camera(seen.camera, seen.feature, &links[seen.sample]);

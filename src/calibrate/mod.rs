@@ -16,6 +16,8 @@ mod robust;
 mod settle;
 mod setup;
 mod stage;
+mod states;
+mod trunk;
 mod visual;
 
 pub use evaluate::{CameraErrors, Errors, Evaluation, evaluate};
@@ -27,7 +29,7 @@ use crate::rig::Rig;
 use deviations::deviations;
 use finish::finish;
 use graph::{Priors, State};
-use handeye_solvers::{Loss, Pose};
+use handeye_solvers::Loss;
 use initialise::initialise;
 use setup::Setup;
 use stage::{Stage, Stages};
@@ -75,12 +77,7 @@ pub fn calibrate(
     let setup = Setup::new(rig, recording)?;
     let priors = Priors::new(&setup);
     let mut stages = Stages::new(&setup, &priors, observer);
-    let mut state = if is_complete(&setup) {
-        let tips = vec![Pose::identity(); setup.joints.len()];
-        State { model: setup.model.clone(), tips }
-    } else {
-        initialise(options.seed, &mut stages)?
-    };
+    let mut state = if is_complete(&setup) { State::new(&setup) } else { initialise(options.seed, &mut stages)? };
     let (mut freedom, gauge) = gauge::end_to_end(&setup, &mut state, &priors);
     let verdict = robust::fit(&mut state, &freedom, &mut stages)?;
     robust::place_moved(&mut state, &mut freedom, &verdict, &mut stages)?;

@@ -84,7 +84,7 @@ pub(crate) fn judge(setup: &Setup, state: &State, left_out: &[bool], moved: &[bo
     };
     let mut wrong_joints = BTreeSet::new();
     let mut wrong_images = BTreeSet::new();
-    for sample in 0..setup.joints.len() {
+    for sample in 0..setup.len() {
         let images: Vec<(usize, usize)> = of_sample(sample).filter(|key| !verdict.moved[key.1]).collect();
         let wrong: Vec<(usize, usize)> = images.iter().copied().filter(|key| bad(key)).collect();
         if !wrong.is_empty() && wrong.len() == images.len() {
@@ -136,7 +136,7 @@ fn bumped_cameras(
 
 /// Distance of every observation from where the state predicts it [px].
 pub(crate) fn distances(setup: &Setup, state: &State) -> Vec<f64> {
-    let links: Vec<_> = setup.joints.iter().map(|joints| state.model.links(joints)).collect();
+    let links = state.all_links(setup);
     let distance = |seen: &super::setup::Observation| {
         let [u, v] = state.model.pixel(seen.camera, seen.feature, &links[seen.sample]);
         (u - seen.pixel[0]).hypot(v - seen.pixel[1])
@@ -147,7 +147,7 @@ pub(crate) fn distances(setup: &Setup, state: &State) -> Vec<f64> {
 /// The camera that moved: its images are shifted as a whole by more than the noise of their detections explains, and lie
 /// further off than those of the other cameras. The worst, where there are several.
 pub(crate) fn moved_camera(setup: &Setup, state: &State, verdict: &Verdict) -> Option<usize> {
-    let links: Vec<_> = setup.joints.iter().map(|joints| state.model.links(joints)).collect();
+    let links = state.all_links(setup);
     let mut images: BTreeMap<(usize, usize), Vec<Vector2<f64>>> = BTreeMap::new();
     for (seen, _) in setup.observations.iter().zip(&verdict.left_out).filter(|(_, out)| !**out) {
         let predicted = state.model.pixel(seen.camera, seen.feature, &links[seen.sample]);
@@ -226,7 +226,7 @@ fn report(
 
 /// Median distance of what a sample's images show from what another sample's joints predict [px].
 fn median_with_joints_of(setup: &Setup, state: &State, moved: &[bool], sample: usize, joints: usize) -> f64 {
-    let links = state.model.links(&setup.joints[joints]);
+    let links = state.links(setup, joints);
     let of_sample = setup.observations.iter().filter(|seen| seen.sample == sample && !moved[seen.camera]);
     let mut distances: Vec<f64> = of_sample
         .map(|seen| {

@@ -41,13 +41,13 @@ pub(crate) fn fit(state: &mut State, freedom: &Freedom, stages: &mut Stages<'_>)
 /// Where most samples do not fit, something is wrong with all of them.
 fn check_rest(setup: &Setup, verdict: &Verdict) -> Result<(), Error> {
     let wrong = verdict.findings.iter().filter(|finding| matches!(finding, Finding::WrongJoints { .. })).count();
-    if 2 * wrong <= setup.joints.len() {
+    if 2 * wrong <= setup.len() {
         return Ok(());
     }
     Err(Error::NotEnoughData(format!(
         "the joints of {wrong} of {} samples do not lead to what the cameras saw: check that readings and images are of the \
          same moments, and the order, units and kinds of the joints",
-        setup.joints.len()
+        setup.len()
     )))
 }
 

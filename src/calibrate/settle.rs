@@ -23,7 +23,9 @@ pub(crate) fn settle(setup: &Setup, state: &mut State) {
         take_signs(setup, state);
         take_ends(setup, state);
     }
-    if let Some(given_from_learned) = given_world(setup, state) {
+    if !setup.states.chain {
+        // The world and its unit are those of the tip poses.
+    } else if let Some(given_from_learned) = given_world(setup, state) {
         move_world(state, &given_from_learned);
     } else if let (Some(base), false) = (setup.rig.robot.base, setup.chain_is_known()) {
         move_world(state, &(base * state.model.base.inverse()));

@@ -1,0 +1,110 @@
+//! Noisy joints, tip poses and actions: whatever a recording holds of the robot's state, the rig is learned from it.
+use crate::learning::{learn, nothing};
+use handeye::calibrate::evaluate;
+use handeye::recording::{Recording, Sample};
+use handeye::rig::{Noise, PoseNoise, Rig};
+use handeye::simulate::{SimulateOptions, Simulation, random_rig, simulate};
+use handeye::solvers::Pose;
+
+const SEEDS: std::ops::RangeInclusive<u64> = 1..=5;
+
+fn noisy(seed: u64, change: impl Fn(&mut Noise)) -> Rig {
+    let mut rig = random_rig(6, 2, 12, seed);
+    change(&mut rig.noise);
+    rig
+}
+
+fn record(rig: &Rig, samples: usize, seed: u64) -> Simulation {
+    simulate(rig, &SimulateOptions { samples, seed, ..SimulateOptions::default() }).expect("the rig is in view")
+}
+
+/// Noise-free samples of the same rig.
+fn fresh(rig: &Rig, seed: u64) -> Recording {
+    record(rig, 100, seed + 1_000).truth
+}
+
+fn without(mut recording: Recording, forget: impl Fn(&mut Sample)) -> Recording {
+    recording.samples.iter_mut().for_each(forget);
+    recording
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Mean pixel distance on noise-free samples.
+fn error(rig: &Rig, recording: &Recording, truth: &Recording) -> f64 {
+    let learned = learn(rig, recording).expect("the recording determines the rig");
+    evaluate(&learned.rig, truth).expect("the learned rig is complete").total.mean_px
+}
+
+#[test]
+fn modelling_the_noise_of_joints_more_than_halves_the_error() {
+    let ratio = |seed: u64| {
+        let truth = noisy(seed, |noise| noise.joints = 0.02);
+        let recording = record(&truth, 100, seed).recording;
+        let fresh = fresh(&truth, seed);
+        let mut plain = nothing(&truth);
+        plain.noise.joints = 0.0;
+        error(&nothing(&truth), &recording, &fresh) / error(&plain, &recording, &fresh)
+    };
+    let ratio = median(SEEDS.map(ratio).collect());
+    assert!(ratio < 0.5, "the error with the noise modelled is {ratio} of that without");
+}
+
+#[test]
+fn joint_actions_alone_determine_the_rig_with_joints_counted_from_the_first_sample() {
+    let error = |seed: u64| {
+        let truth = noisy(seed, |noise| noise.joint_action = 0.002);
+        let Simulation { recording, truth: states, .. } = record(&truth, 60, seed);
+        let recording = without(recording, |sample| (sample.joints, sample.pose) = (None, None));
+        let zero = states.samples[0].joints.clone().expect("joints are simulated");
+        let fresh = without(fresh(&truth, seed), |sample| {
+            sample.joints.iter_mut().for_each(|joints| joints.iter_mut().zip(&zero).for_each(|(j, zero)| *j -= zero));
+        });
+        error(&nothing(&truth), &recording, &fresh)
+    };
+    let error = median(SEEDS.map(error).collect());
+    assert!(error < 0.3, "{error} px without pixel noise");
+}
+
+#[test]
+fn pose_actions_alone_determine_cameras_and_features_in_the_world_of_the_first_tip() {
+    let error = |seed: u64| {
+        let truth = noisy(seed, |noise| noise.pose_action = PoseNoise { xyz: 0.002, rot: 0.002 });
+        let Simulation { recording, truth: states, .. } = record(&truth, 60, seed);
+        let recording = without(recording, |sample| (sample.joints, sample.pose) = (None, None));
+        let back = states.samples[0].pose.expect("poses are simulated").inverse();
+        let fresh = without(fresh(&truth, seed), |sample| {
+            sample.joints = None;
+            sample.pose = sample.pose.map(|pose| pose * back);
+        });
+        error(&nothing(&truth), &recording, &fresh)
+    };
+    let error = median(SEEDS.map(error).collect());
+    assert!(error < 0.3, "{error} px without pixel noise");
+}
+
+#[test]
+fn exact_tip_poses_are_the_limit_of_noisy_ones() {
+    for seed in SEEDS {
+        let truth = random_rig(6, 2, 12, seed);
+        let simulated = record(&truth, 50, seed);
+        let fresh = without(fresh(&truth, seed), |sample| sample.joints = None);
+        let with_poses = |pose: &dyn Fn(&Sample) -> Option<Pose>| {
+            let mut recording = simulated.recording.clone();
+            for (sample, truth) in recording.samples.iter_mut().zip(&simulated.truth.samples) {
+                (sample.joints, sample.pose) = (None, pose(truth));
+            }
+            recording
+        };
+        let recording = with_poses(&|truth| truth.pose);
+        let exact = error(&nothing(&truth), &recording, &fresh);
+        assert!(exact < 0.1, "seed {seed}: {exact} px without pixel noise");
+        let mut nearly = nothing(&truth);
+        nearly.noise.pose = PoseNoise { xyz: 1e-6, rot: 1e-6 };
+        let limit = error(&nearly, &recording, &fresh);
+        assert!((limit - exact).abs() < 1e-3, "seed {seed}: {limit} px for poses as good as exact, {exact} px for exact ones");
+    }
+}
