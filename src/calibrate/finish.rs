@@ -76,6 +76,7 @@ pub(crate) fn finish(
         stages,
         converged,
         gauge,
+        states: setup.states.words.clone(),
         findings: misfit.into_iter().chain(unseen).chain(verdict.findings).collect(),
         tip: deviations.tip,
     };
@@ -86,7 +87,9 @@ pub(crate) fn finish(
 fn learned(setup: &Setup, state: &State) -> Rig {
     let mut rig = setup.rig.clone();
     let model = &state.model;
-    rig.robot.base = Some(model.base);
+    if setup.states.chain {
+        rig.robot.base = Some(model.base);
+    }
     for (index, joint) in rig.robot.joints.iter_mut().enumerate() {
         let [offset, d, a, alpha, beta] = std::array::from_fn(|k| model.parameters[row(index) + k]);
         joint.offset = Some(wrapped(offset));

@@ -4,6 +4,7 @@ use super::evaluate::median;
 use super::graph::State;
 use super::kinematics::{find_axes, find_lines, rows};
 use super::look::look;
+use super::motion::from_motion;
 use super::outliers::distances;
 use super::settle::settle;
 use super::setup::Setup;
@@ -29,33 +30,37 @@ const WIDTH: f64 = 20.0;
 /// chain does.
 pub(crate) fn initialise(seed: u64, stages: &mut Stages<'_>) -> Result<State, Error> {
     let setup = stages.setup;
-    let explanations = look(seed, stages)?;
+    let (explanations, mut failure) = match look(seed, stages) {
+        Ok(explanations) => (explanations, None),
+        Err(Error::NotEnoughData(reason)) if setup.motion_is_known() => {
+            (Vec::new(), Some(Error::NotEnoughData(reason)))
+        }
+        Err(error) => return Err(error),
+    };
     let most = explanations.iter().map(|seen| seen.samples().len()).max().unwrap_or(0);
-    let mut best: Option<(f64, f64, State)> = None;
-    let mut failure = None;
+    let mut best: Option<First> = None;
     for seen in explanations {
         let mut state = seen.state.clone();
         let Some(misfit) = place_chain(&seen.samples(), &mut state, seed, stages) else { continue };
-        if let Err(error) = join::join(setup, &mut state, &seen.cameras, &seen.features, seed) {
-            failure.get_or_insert(error);
-            continue;
+        match complete(state, misfit, &seen.cameras, &seen.features, seed, stages) {
+            Ok(first) => take_better(&mut best, first),
+            Err(Error::NotEnoughData(reason)) => failure = failure.or(Some(Error::NotEnoughData(reason))),
+            Err(error) => return Err(error),
         }
-        settle(setup, &mut state);
-        let (freedom, _) = gauge::end_to_end(setup, &mut state, stages.priors);
-        let (loss, takes_part) = (Loss::Cauchy(WIDTH), |_: usize| true);
-        stages.minimize(
-            &Stage { name: "end to end, robust", freedom: &freedom, loss, takes_part: &takes_part },
-            &mut state,
-        )?;
-        let error = median(&mut distances(setup, &state)) / setup.sigma();
-        if best.as_ref().is_none_or(|best| error < best.0) {
-            best = Some((error, misfit, state));
-        }
-        if error < EXPLAINED {
+        if best.as_ref().is_some_and(|best| best.error < EXPLAINED) {
             break;
         }
     }
-    let (error, misfit, state) = best.ok_or_else(|| failure.unwrap_or_else(|| undetermined(setup, most)))?;
+    if setup.motion_is_known()
+        && best.as_ref().is_none_or(|best| best.error > EXPLAINED)
+        && let Some(from) = from_motion(seed, stages)?
+    {
+        match complete(from.state, 0.0, &from.cameras, &from.features, seed, stages) {
+            Ok(first) => take_better(&mut best, first),
+            Err(error) => failure = failure.or(Some(error)),
+        }
+    }
+    let First { error, misfit, state } = best.ok_or_else(|| failure.unwrap_or_else(|| undetermined(setup, most)))?;
     if error > EXPLAINED && misfit > UNRELATED + setup.state_angle() {
         return Err(Error::NotEnoughData(format!(
             "no chain of {} joints moves as the images show: the best is {:.0} degrees off in the median; check that readings and \
@@ -65,6 +70,39 @@ pub(crate) fn initialise(seed: u64, stages: &mut Stages<'_>) -> Result<State, Er
         )));
     }
     Ok(state)
+}
+
+/// A first state, its usual error [standard deviations], and the angle between the tips of the motion and the seen ones.
+struct First {
+    error: f64,
+    misfit: f64,
+    state: State,
+}
+
+fn take_better(best: &mut Option<First>, first: First) {
+    if best.as_ref().is_none_or(|best| first.error < best.error) {
+        *best = Some(first);
+    }
+}
+
+/// Brings in everything that is not placed yet, and fits all of it.
+fn complete(
+    mut state: State,
+    misfit: f64,
+    cameras: &[bool],
+    features: &[bool],
+    seed: u64,
+    stages: &mut Stages<'_>,
+) -> Result<First, Error> {
+    let setup = stages.setup;
+    join::join(setup, &mut state, cameras, features, seed)?;
+    settle(setup, &mut state);
+    let (freedom, _) = gauge::end_to_end(setup, &mut state, stages.priors);
+    let (loss, takes_part) = (Loss::Cauchy(WIDTH), |_: usize| true);
+    let stage = Stage { name: "end to end, robust", freedom: &freedom, loss, takes_part: &takes_part };
+    stages.minimize(&stage, &mut state)?;
+    let error = median(&mut distances(setup, &state)) / setup.sigma();
+    Ok(First { error, misfit, state })
 }
 
 /// The chain where the seen tips are, or the seen tips where the known motion is. Returns the usual angle between them.

@@ -9,8 +9,10 @@ mod initialise;
 mod join;
 mod kinematics;
 mod look;
+mod motion;
 mod outliers;
 mod priors;
+mod readings;
 mod report;
 mod robust;
 mod settle;
@@ -18,6 +20,7 @@ mod setup;
 mod stage;
 mod states;
 mod trunk;
+mod unknown;
 mod visual;
 
 pub use evaluate::{CameraErrors, Errors, Evaluation, evaluate};
@@ -78,6 +81,7 @@ pub fn calibrate(
     let priors = Priors::new(&setup);
     let mut stages = Stages::new(&setup, &priors, observer);
     let mut state = if is_complete(&setup) { State::new(&setup) } else { initialise(options.seed, &mut stages)? };
+    unknown::place_unknown(&mut state, &stages);
     let (mut freedom, gauge) = gauge::end_to_end(&setup, &mut state, &priors);
     let verdict = robust::fit(&mut state, &freedom, &mut stages)?;
     robust::place_moved(&mut state, &mut freedom, &verdict, &mut stages)?;

@@ -99,6 +99,11 @@ impl Setup {
         self.samples.len()
     }
 
+    /// True where the tip's motion is known before anything is learned: its poses, or joints of a known chain.
+    pub fn motion_is_known(&self) -> bool {
+        !self.states.chain || self.chain_is_known()
+    }
+
     /// About how far a first value of a state turns the tip wrongly [rad].
     pub fn state_angle(&self) -> f64 {
         let (states, noise) = (&self.states, &self.rig.noise);

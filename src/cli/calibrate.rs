@@ -98,6 +98,7 @@ fn describe(before: &Rig, learned: &Rig, report: &Report, seconds: f64) -> Strin
         text += &format!("\nthe tip's position is known to {}\n", tip_in_words(tip));
     }
     for (title, lines) in [
+        ("what is known of the robot's state", report.states.clone()),
         ("what the data leave open, and how it was fixed", report.gauge.clone()),
         ("what does not fit", report.findings.iter().map(Finding::to_string).collect()),
     ] {
@@ -158,6 +159,7 @@ pub fn report_json(report: &Report) -> Value {
         "stages": report.stages.iter().map(stage).collect::<Vec<_>>(),
         "converged": report.converged,
         "gauge": report.gauge,
+        "states": report.states,
         "findings": report.findings.iter().map(finding_json).collect::<Vec<_>>(),
         "tip_sd": report.tip.map(|tip| json!({ "median": tip.median, "largest": tip.largest, "metric": tip.metric })),
         "tip_sd_mm": metric.map(|tip| 1e3 * tip.median),
@@ -173,6 +175,7 @@ fn finding_json(finding: &Finding) -> Value {
         Finding::WrongJoints { sample, median_px, swapped_with } => {
             json!({ "kind": "wrong_joints", "sample": sample, "median_px": median_px, "swapped_with": swapped_with })
         }
+        Finding::UnknownState { sample } => json!({ "kind": "unknown_state", "sample": sample }),
         Finding::WrongImage { sample, camera, median_px } => {
             json!({ "kind": "wrong_image", "sample": sample, "camera": camera, "median_px": median_px })
         }

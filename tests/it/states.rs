@@ -1,6 +1,6 @@
 //! Noisy joints, tip poses and actions: whatever a recording holds of the robot's state, the rig is learned from it.
 use crate::learning::{learn, nothing};
-use handeye::calibrate::evaluate;
+use handeye::calibrate::{Finding, evaluate};
 use handeye::recording::{Recording, Sample};
 use handeye::rig::{Noise, PoseNoise, Rig};
 use handeye::simulate::{SimulateOptions, Simulation, random_rig, simulate};
@@ -105,6 +105,44 @@ fn exact_tip_poses_are_the_limit_of_noisy_ones() {
         let mut nearly = nothing(&truth);
         nearly.noise.pose = PoseNoise { xyz: 1e-6, rot: 1e-6 };
         let limit = error(&nearly, &recording, &fresh);
-        assert!((limit - exact).abs() < 1e-3, "seed {seed}: {limit} px for poses as good as exact, {exact} px for exact ones");
+        assert!(
+            (limit - exact).abs() < 1e-3,
+            "seed {seed}: {limit} px for poses as good as exact, {exact} px for exact ones"
+        );
     }
+}
+
+#[test]
+fn samples_without_readings_take_part_where_their_images_determine_them() {
+    for seed in SEEDS {
+        let truth = random_rig(6, 2, 12, seed);
+        let simulated = record(&truth, 60, seed);
+        let mut recording = simulated.recording.clone();
+        recording.samples.iter_mut().step_by(3).for_each(|sample| sample.joints = None);
+        let learned = learn(&nothing(&truth), &recording).expect("two thirds have joints");
+        let unknown =
+            learned.report.findings.iter().filter(|found| matches!(found, Finding::UnknownState { .. })).count();
+        assert!(unknown <= 4 && learned.report.samples == 60 - unknown, "seed {seed}: {:?}", learned.report.findings);
+        let error = evaluate(&learned.rig, &fresh(&truth, seed)).expect("complete").total.mean_px;
+        assert!(error < 0.12, "seed {seed}: {error} px without pixel noise");
+    }
+}
+
+#[test]
+fn a_wrong_reading_among_noisy_ones_is_named_and_let_go_of() {
+    for seed in SEEDS {
+        let truth = noisy(seed, |noise| noise.joints = 0.01);
+        let mut recording = record(&truth, 60, seed).recording;
+        let clean = error(&nothing(&truth), &recording, &fresh(&truth, seed));
+        recording.samples[17].joints.as_mut().expect("joints are simulated")[2] += 0.4;
+        let learned = learn(&nothing(&truth), &recording).expect("one wrong row does not matter");
+        let named: Vec<usize> = learned.report.findings.iter().filter_map(wrong_sample).collect();
+        assert_eq!(named, [17], "seed {seed}: {:?}", learned.report.findings);
+        let spoilt = evaluate(&learned.rig, &fresh(&truth, seed)).expect("complete").total.mean_px;
+        assert!(spoilt < 1.2 * clean + 0.02, "seed {seed}: {clean} px became {spoilt} px");
+    }
+}
+
+fn wrong_sample(finding: &Finding) -> Option<usize> {
+    if let Finding::WrongJoints { sample, .. } = finding { Some(*sample) } else { None }
 }
