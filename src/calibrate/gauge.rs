@@ -195,7 +195,8 @@ fn is_alpha_fixed(setup: &Setup, joint: usize) -> bool {
 /// Something given places the world: a camera in it, or a feature.
 pub(crate) fn world_is_known(setup: &Setup) -> bool {
     let rig = &setup.rig;
-    rig.cameras.iter().any(|camera| camera.parent == Parent::World && camera.pose.is_some())
+    setup.states.poses_beside_joints()
+        || rig.cameras.iter().any(|camera| camera.parent == Parent::World && camera.pose.is_some())
         || rig.features.iter().any(|feature| feature.parent == Parent::World && feature.xyz.is_some())
 }
 
@@ -217,6 +218,7 @@ pub(crate) fn length_is_known(setup: &Setup) -> bool {
         cameras.count() + features.count()
     };
     !setup.states.chain
+        || setup.states.poses_beside_joints()
         || rig.robot.joints.iter().any(|joint| joint.kind == JointKind::Prismatic || given(joint.d) || given(joint.a))
         || of_parent(Parent::World) >= 2
         || of_parent(Parent::Tip) >= 2

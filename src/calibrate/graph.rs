@@ -16,6 +16,8 @@ pub(crate) struct State {
     pub tips: Vec<Pose>,
     /// Joints of every sample, where there is a chain.
     pub joints: Vec<Vec<f64>>,
+    /// Of what recorded poses are, `tip_from_tool`: the frame of a learned chain's tip is not that of the recorded poses.
+    pub tool: Pose,
     /// Whether a joint reading takes part; a wrong one is let go of.
     pub trusted: Vec<bool>,
     /// Whether the state of a sample is known well enough to take part.
@@ -35,6 +37,7 @@ impl State {
             model: setup.model.clone(),
             tips: starts.iter().map(tip).collect(),
             joints: starts.iter().map(joints).collect(),
+            tool: Pose::identity(),
             trusted: vec![true; starts.len()],
             placed: starts.iter().map(Option::is_some).collect(),
         }
@@ -101,6 +104,7 @@ pub(crate) struct Built {
     pub features: Vec<Key<Vector<3>>>,
     pub tips: Vec<Option<Key<Pose>>>,
     pub joints: Vec<Option<Key<DynamicVector>>>,
+    pub tool: Key<Pose>,
     /// The factor of each observation that takes part.
     pub factors: Vec<(usize, FactorKey)>,
 }
@@ -154,6 +158,9 @@ pub(crate) fn build(
     takes_part: impl Fn(usize) -> bool,
 ) -> Built {
     let mut built = Built::rig(state, freedom);
+    if !(setup.tool_is_open() && freedom.source == Tips::Chain) {
+        built.graph.hold(built.tool);
+    }
     let mut trunk = Trunk::new(setup, state, freedom, &mut built);
     let model = &state.model;
     for (index, seen) in setup.observations.iter().enumerate() {
@@ -201,8 +208,9 @@ impl Built {
             features.push(key);
         }
         let n = state.tips.len();
+        let tool = graph.free(state.tool);
         let (tips, joints, factors) = (vec![None; n], vec![None; n], Vec::new());
-        Built { graph, base, parameters, cameras, features, tips, joints, factors }
+        Built { graph, base, parameters, cameras, features, tips, joints, tool, factors }
     }
 
     fn add_priors(&mut self, priors: &Priors, freedom: &Freedom) {
@@ -236,6 +244,7 @@ impl Built {
 
     /// Takes the graph's values over.
     pub fn read(&self, state: &mut State) {
+        state.tool = self.graph.value(self.tool);
         let model = &mut state.model;
         model.base = self.graph.value(self.base);
         model.parameters.copy_from_slice(self.graph.value(self.parameters).as_slice());

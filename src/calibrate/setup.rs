@@ -104,6 +104,11 @@ impl Setup {
         !self.states.chain || self.chain_is_known()
     }
 
+    /// True where poses were recorded beside a chain that is learned, whose tip is in a frame of its own.
+    pub fn tool_is_open(&self) -> bool {
+        self.states.poses_beside_joints() && !self.chain_is_known()
+    }
+
     /// About how far a first value of a state turns the tip wrongly [rad].
     pub fn state_angle(&self) -> f64 {
         let (states, noise) = (&self.states, &self.rig.noise);

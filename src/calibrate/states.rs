@@ -90,6 +90,11 @@ impl States {
         self.readings.len()
     }
 
+    /// True where recorded tip poses take part beside joints.
+    pub fn poses_beside_joints(&self) -> bool {
+        self.chain && self.poses.iter().any(Option::is_some)
+    }
+
     fn push(&mut self, sample: &Sample, noise: &Noise) {
         let chain = self.chain;
         let use_pose = if chain { noise.pose.is_noisy() } else { true };

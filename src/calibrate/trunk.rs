@@ -101,7 +101,7 @@ impl<'a> Trunk<'a> {
                 continue;
             }
             let tip = self.carrier(Parent::Tip, sample, built);
-            built.graph.factor(PoseReading { reading }, (tip,)).sigmas(sigmas(noise.pose)).loss(loss);
+            built.graph.factor(PoseReading { reading }, (tip, built.tool)).sigmas(sigmas(noise.pose)).loss(loss);
         }
         for sample in (0..states.len().saturating_sub(1)).filter(|&sample| !held(sample) || !held(sample + 1)) {
             if !(self.state.placed[sample] && self.state.placed[sample + 1]) {

@@ -2,20 +2,22 @@
 use handeye_solvers::manifold::so3;
 use handeye_solvers::{Factor, Pose, Scalar};
 
-/// From the reading to the tip's pose: rotation vector [rad], then translation [m], both in the world.
+/// From the reading to the pose of what was read: rotation vector [rad], then translation [m], both in the world.
 ///
-///   r = (log(R Rᵣᵀ), t - tᵣ)
+///   r = (log(R Rᵣᵀ), t - tᵣ), (R, t) = P Z
+///
+/// on (P = world_from_tip, Z = tip_from_tool). The tool is the identity where the tip itself is what was read.
 #[derive(Clone, Copy, Debug)]
 pub struct PoseReading {
-    /// What was read, `world_from_tip`.
+    /// What was read, `world_from_tool`.
     pub reading: Pose,
 }
 
 impl Factor<6> for PoseReading {
-    type On = (Pose,);
+    type On = (Pose, Pose);
 
-    fn residual<T: Scalar>(&self, (tip,): (Pose<T>,)) -> [T; 6] {
-        difference(&tip, &self.reading)
+    fn residual<T: Scalar>(&self, (tip, tool): (Pose<T>, Pose<T>)) -> [T; 6] {
+        difference(&(tip * tool), &self.reading)
     }
 }
 

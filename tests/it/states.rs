@@ -146,3 +146,21 @@ fn a_wrong_reading_among_noisy_ones_is_named_and_let_go_of() {
 fn wrong_sample(finding: &Finding) -> Option<usize> {
     if let Finding::WrongJoints { sample, .. } = finding { Some(*sample) } else { None }
 }
+
+#[test]
+fn poses_beside_joints_give_the_world_and_its_unit() {
+    for seed in SEEDS {
+        let truth = noisy(seed, |noise| noise.pose = PoseNoise { xyz: 0.001, rot: 0.001 });
+        let recording = record(&truth, 50, seed).recording;
+        let mut known = nothing(&truth);
+        known.estimate.fixed = ["fx", "fy", "cx", "cy"].map(|field| format!("cameras.*.{field}")).to_vec();
+        let learned = learn(&known, &recording).expect("joints and poses determine the rig");
+        for (camera, truth) in learned.rig.cameras.iter().zip(&truth.cameras) {
+            let (learned, truth) = (camera.pose.expect("learned"), truth.pose.expect("given"));
+            let apart = (learned.translation - truth.translation).norm();
+            assert!(apart < 0.002 && learned.angle_to(&truth) < 0.001, "seed {seed}: {apart} m");
+        }
+        let error = evaluate(&learned.rig, &fresh(&truth, seed)).expect("complete").total.mean_px;
+        assert!(error < 0.15, "seed {seed}: {error} px without pixel noise");
+    }
+}
