@@ -76,6 +76,7 @@ pub(crate) fn finish(
         stages,
         converged,
         gauge,
+        noise: None,
         states: setup.states.words.clone(),
         findings: misfit.into_iter().chain(unseen).chain(verdict.findings).collect(),
         tip: deviations.tip,

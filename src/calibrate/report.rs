@@ -1,6 +1,6 @@
 //! What a calibration did and found, and how good it is.
 use super::CameraErrors;
-use crate::rig::Rig;
+use crate::rig::{Noise, Rig};
 
 /// A learned rig and how it came about.
 #[derive(Clone, Debug)]
@@ -36,6 +36,8 @@ pub struct Report {
     pub gauge: Vec<String>,
     /// Where the robot's state is known from: which readings and actions take part, and how well they are known.
     pub states: Vec<String>,
+    /// The noise as it was estimated, where that was asked for; it is the learned rig's.
+    pub noise: Option<Noise>,
     /// Samples, images and cameras that do not fit.
     pub findings: Vec<Finding>,
     /// Standard deviation of the tip over the recorded workspace; `None` where the data leave the rig open.

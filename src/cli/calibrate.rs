@@ -36,6 +36,9 @@ pub struct Calibrate {
     /// Also learn K times without every K-th sample, and report how well those are predicted
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(2..))]
     folds: Option<u32>,
+    /// Estimate the noise of pixels, joints, poses and actions from the data; [noise] of the rig is where that starts
+    #[arg(long)]
+    estimate_noise: bool,
     /// Seed of every random choice: the same seed gives the same rig
     #[arg(long, value_name = "S", default_value_t = Options::default().seed)]
     seed: u64,
@@ -50,7 +53,7 @@ impl Calibrate {
         let recording = read_recordings(&self.recordings, input.as_ref())?;
         check_output(&self.output, &self.recordings)?;
         let (rig, text) = input.map_or_else(|| (Rig::default(), None), |input| (input.rig, Some(input.text)));
-        let options = Options { seed: self.seed };
+        let options = Options { seed: self.seed, estimate_noise: self.estimate_noise };
         let bar = Bar::new(is_json);
         let (folds, calibration, seconds) = on_threads(self.threads, || {
             let folds = self.folds.map(|n| Folds::new(&rig, &recording, n as usize, &options, &bar)).transpose()?;

@@ -9,6 +9,6 @@ mod reprojection;
 pub use forward_kinematics::ForwardKinematics;
 pub use joint_action::JointAction;
 pub use joint_reading::JointReading;
-pub use pose_action::PoseAction;
+pub use pose_action::{Motion, PoseAction};
 pub use pose_reading::PoseReading;
 pub use reprojection::{Intrinsics, Reprojection};

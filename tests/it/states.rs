@@ -1,10 +1,11 @@
 //! Noisy joints, tip poses and actions: whatever a recording holds of the robot's state, the rig is learned from it.
 use crate::learning::{learn, nothing};
-use handeye::calibrate::{Finding, evaluate};
+use handeye::calibrate::{Finding, Options, calibrate, evaluate};
 use handeye::recording::{Recording, Sample};
 use handeye::rig::{Noise, PoseNoise, Rig};
 use handeye::simulate::{SimulateOptions, Simulation, random_rig, simulate};
 use handeye::solvers::Pose;
+use std::ops::ControlFlow;
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=5;
 
@@ -163,4 +164,63 @@ fn poses_beside_joints_give_the_world_and_its_unit() {
         let error = evaluate(&learned.rig, &fresh(&truth, seed)).expect("complete").total.mean_px;
         assert!(error < 0.15, "seed {seed}: {error} px without pixel noise");
     }
+}
+
+/// Estimated over true standard deviation, by what was measured, for many recordings.
+fn ratios(
+    samples: usize,
+    state: impl Fn(&mut Noise),
+    forget: impl Fn(&mut Sample),
+    parts: &[fn(&Noise) -> f64],
+) -> Vec<Vec<f64>> {
+    let mut ratios = vec![Vec::new(); parts.len()];
+    for seed in 1..=12 {
+        let truth = noisy(seed, &state);
+        let recording = without(record(&truth, samples, seed).recording, &forget);
+        let rig = Rig { noise: Noise { pixels: 1.0, ..Noise::default() }, ..nothing(&truth) };
+        let options = Options { estimate_noise: true, ..Options::default() };
+        let learned = calibrate(&rig, &recording, &options, &mut |_| ControlFlow::Continue(())).expect("enough data");
+        let noise = learned.report.noise.expect("asked for");
+        assert_eq!(learned.rig.noise, noise);
+        for (ratios, part) in ratios.iter_mut().zip(parts) {
+            ratios.push(part(&noise) / part(&truth.noise));
+        }
+    }
+    ratios
+}
+
+/// The mean ratio is 1 within 3 standard errors of it, and no ratio is far off.
+fn assert_unbiased(ratios: &[Vec<f64>], scatter: f64) {
+    for (part, ratios) in ratios.iter().enumerate() {
+        let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+        let far = ratios.iter().map(|ratio| (ratio - 1.0).abs()).fold(0.0, f64::max);
+        let standard_error = scatter / (ratios.len() as f64).sqrt();
+        assert!((mean - 1.0).abs() < 3.0 * standard_error + 0.01 && far < 4.0 * scatter, "part {part}: {ratios:.3?}");
+    }
+}
+
+// With n redundant measurements, the standard deviation of an estimated standard deviation is its 1/√(2n): here about 300.
+#[test]
+fn noise_of_pixels_and_joints_is_estimated_from_a_wrong_start() {
+    let forget = |sample: &mut Sample| sample.pose = None;
+    let ratios = ratios(60, |noise| noise.joints = 0.02, forget, &[|noise| noise.pixels, |noise| noise.joints]);
+    assert_unbiased(&ratios, 0.05);
+}
+
+#[test]
+fn noise_of_tip_poses_is_estimated_where_the_rig_calls_them_exact() {
+    let forget = |sample: &mut Sample| sample.joints = None;
+    let state = |noise: &mut Noise| noise.pose = PoseNoise { xyz: 0.003, rot: 0.006 };
+    let ratios = ratios(60, state, forget, &[|n| n.pixels, |n| n.pose.xyz, |n| n.pose.rot]);
+    assert_unbiased(&ratios, 0.07);
+}
+
+#[test]
+fn noise_of_actions_is_estimated_where_nothing_else_is_known() {
+    let forget = |sample: &mut Sample| (sample.joints, sample.pose) = (None, None);
+    let joints = ratios(60, |noise| noise.joint_action = 0.01, forget, &[|n| n.pixels, |n| n.joint_action]);
+    assert_unbiased(&joints, 0.05);
+    let state = |noise: &mut Noise| noise.pose_action = PoseNoise { xyz: 0.004, rot: 0.008 };
+    let poses = ratios(60, state, forget, &[|n| n.pixels, |n| n.pose_action.xyz, |n| n.pose_action.rot]);
+    assert_unbiased(&poses, 0.07);
 }
