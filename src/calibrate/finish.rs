@@ -77,7 +77,7 @@ pub(crate) fn finish(
         converged,
         gauge,
         noise: None,
-        states: setup.states.words.clone(),
+        states: setup.states.words(&setup.rig.noise),
         findings: misfit.into_iter().chain(unseen).chain(verdict.findings).collect(),
         tip: deviations.tip,
     };

@@ -15,6 +15,7 @@ mod priors;
 mod readings;
 mod report;
 mod robust;
+mod selection;
 mod settle;
 mod setup;
 mod stage;
@@ -26,6 +27,7 @@ mod visual;
 
 pub use evaluate::{CameraErrors, Errors, Evaluation, evaluate};
 pub use report::{Calibration, Finding, Report, StageReport, TipDeviation};
+pub use selection::{NoiseTrial, select_noise};
 
 use crate::Error;
 use crate::recording::Recording;
@@ -83,7 +85,7 @@ pub fn calibrate(
 ) -> Result<Calibration, Error> {
     let mut rig = rig.clone();
     if options.estimate_noise {
-        variances::guess(&mut rig.noise);
+        variances::guess(&mut rig.noise, recording);
     }
     let mut setup = Setup::new(&rig, recording)?;
     let (mut start, mut reports) = (None, Vec::new());
@@ -102,6 +104,13 @@ pub fn calibrate(
         start = Some(attempt.state);
         round += 1;
     }
+}
+
+/// Which of the paper's settings applies to a recording, in words: what tells of the robot's state, and how well it is known.
+///
+/// Fails as [`calibrate()`] does where rig and recording do not fit together.
+pub fn states_in_words(rig: &Rig, recording: &Recording) -> Result<Vec<String>, Error> {
+    Ok(Setup::new(rig, recording)?.states.words(&rig.noise))
 }
 
 /// Rounds of the estimation of noise at most, and the relative change below which it has settled.

@@ -3,11 +3,14 @@ use super::answer::Answer;
 use super::counts::learned_in_words;
 use super::folds::Folds;
 use super::inputs::{check_output, read_recordings, read_rig};
+use super::noise;
 use super::progress::Bar;
 use super::words::{cameras_json, count, duration, error_table};
 use clap::Args;
 use handeye::Error;
-use handeye::calibrate::{Calibration, Errors, Finding, Options, Report, TipDeviation, calibrate};
+use handeye::calibrate::{
+    Calibration, Errors, Finding, NoiseTrial, Options, Report, TipDeviation, calibrate, select_noise,
+};
 use handeye::rig::Rig;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -39,6 +42,9 @@ pub struct Calibrate {
     /// Estimate the noise of pixels, joints, poses and actions from the data; [noise] of the rig is where that starts
     #[arg(long)]
     estimate_noise: bool,
+    /// Pick the noise of joints or poses, relative to that of pixels, by how well samples held out are predicted
+    #[arg(long, conflicts_with = "estimate_noise")]
+    select_noise: bool,
     /// Seed of every random choice: the same seed gives the same rig
     #[arg(long, value_name = "S", default_value_t = Options::default().seed)]
     seed: u64,
@@ -52,20 +58,29 @@ impl Calibrate {
         let input = self.rig.as_deref().map(read_rig).transpose()?;
         let recording = read_recordings(&self.recordings, input.as_ref())?;
         check_output(&self.output, &self.recordings)?;
-        let (rig, text) = input.map_or_else(|| (Rig::default(), None), |input| (input.rig, Some(input.text)));
+        let (mut rig, text) = input.map_or_else(|| (Rig::default(), None), |input| (input.rig, Some(input.text)));
         let options = Options { seed: self.seed, estimate_noise: self.estimate_noise };
         let bar = Bar::new(is_json);
-        let (folds, calibration, seconds) = on_threads(self.threads, || {
+        let (trials, folds, calibration, seconds) = on_threads(self.threads, || {
+            let mut trials = Vec::new();
+            if self.select_noise {
+                trials = select_noise(&rig, &recording, &options, &mut |progress| bar.show("", progress))?;
+                rig.noise = NoiseTrial::best(&trials).map_or(rig.noise, |best| best.noise);
+            }
             let folds = self.folds.map(|n| Folds::new(&rig, &recording, n as usize, &options, &bar)).transpose()?;
             let start = std::time::Instant::now();
             let calibration = calibrate(&rig, &recording, &options, &mut |progress| bar.show("", progress))?;
-            Ok((folds, calibration, start.elapsed().as_secs_f64()))
+            Ok((trials, folds, calibration, start.elapsed().as_secs_f64()))
         })?;
         drop(bar);
         let Calibration { rig: learned, report } = calibration;
         let output = self.output.display();
         let mut answer = Answer::new(describe(&rig, &learned, &report, seconds), report_json(&report));
         answer.json["seconds"] = json!(seconds);
+        if !trials.is_empty() {
+            answer.text += &format!("\n{}", noise::trials_table(&trials));
+            answer.json["noise_trials"] = noise::trials_json(&trials);
+        }
         if let Some(folds) = &folds {
             answer.text += &format!("\n{}", folds.text());
             answer.json["held_out"] = folds.json();
@@ -97,6 +112,9 @@ fn describe(before: &Rig, learned: &Rig, report: &Report, seconds: f64) -> Strin
     let learned = learned_in_words(before, learned);
     let mut text = format!("{learned} from {samples} with {detections}, in {}\n\n", duration(seconds));
     text += &error_table(&report.cameras, &together(report), report.rejected).to_string();
+    if let Some(noise) = &report.noise {
+        text += &format!("\nthe noise, estimated from the data: {}\n", noise::in_words(noise));
+    }
     if let Some(tip) = &report.tip {
         text += &format!("\nthe tip's position is known to {}\n", tip_in_words(tip));
     }
@@ -163,6 +181,7 @@ pub fn report_json(report: &Report) -> Value {
         "converged": report.converged,
         "gauge": report.gauge,
         "states": report.states,
+        "noise": report.noise.as_ref().map(noise::json),
         "findings": report.findings.iter().map(finding_json).collect::<Vec<_>>(),
         "tip_sd": report.tip.map(|tip| json!({ "median": tip.median, "largest": tip.largest, "metric": tip.metric })),
         "tip_sd_mm": metric.map(|tip| 1e3 * tip.median),

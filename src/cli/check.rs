@@ -6,6 +6,7 @@ use super::survey::Survey;
 use super::words::{count, list};
 use clap::Args;
 use handeye::Error;
+use handeye::calibrate::states_in_words;
 use handeye::rig::{Camera, Model, Parent, Rig};
 use serde_json::json;
 use std::path::PathBuf;
@@ -58,9 +59,16 @@ impl Check {
             let survey = Survey::new(rig, &recording);
             text += &format!("\n{survey}");
             json["recording"] = survey.json();
+            let states = states_in_words(rig, &recording)?;
+            text += &format!("\nthe robot's state:\n{}", lines(&states));
+            json["states"] = json!(states);
         }
         Ok(Answer::new(text, json))
     }
+}
+
+fn lines(lines: &[String]) -> String {
+    lines.iter().map(|line| format!("  {line}\n")).collect()
 }
 
 fn describe(rig: &Rig, file: &str, counts: &Counts) -> String {

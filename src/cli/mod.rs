@@ -8,6 +8,7 @@ mod demo;
 mod evaluate;
 mod folds;
 mod inputs;
+mod noise;
 mod progress;
 mod simulate;
 mod survey;
