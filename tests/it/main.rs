@@ -13,5 +13,6 @@ mod readme;
 mod recording_files;
 mod rig_files;
 mod simulate;
+mod states;
 mod tidy;
 mod wrong_data;
