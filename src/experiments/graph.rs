@@ -19,8 +19,6 @@ const CENTRE: f64 = 0.02;
 pub(super) enum Readings {
     /// They are the joints (eq. 6).
     Exact,
-    /// They are the joints but for noise of this standard deviation [rad] (eq. 10).
-    Noisy(f64),
     /// They are where to begin, and nothing else.
     Start,
 }
@@ -101,13 +99,9 @@ impl Problem {
         for sample in &recording.samples {
             let Some(read) = &sample.joints else { continue };
             let read = DynamicVector::from_column_slice(read);
-            let joints = self.graph.free(read.clone());
-            match readings {
-                Readings::Exact => self.graph.hold(joints),
-                Readings::Noisy(sd) => {
-                    self.graph.prior(joints, &read, &vec![sd; read.len()]);
-                }
-                Readings::Start => {}
+            let joints = self.graph.free(read);
+            if readings == Readings::Exact {
+                self.graph.hold(joints);
             }
             self.joints.push(joints);
             let kinematics = ForwardKinematics { chain: chain.clone(), upto: chain.len() };

@@ -102,7 +102,7 @@ fn where_the_settings_are_comparable_ours_is_at_least_as_good_as_published() {
             assert!(ours <= published, "{name}, {}: {ours}, published {published}", row.label);
         }
     }
-    let noisy = run("table8", 10);
+    let noisy = run("table8", 6);
     for sd in ["0.01", "0.02", "0.03"] {
         let row = |what: &str| noisy.rows.iter().find(|row| row.label == format!("{sd} rad, {what}")).unwrap();
         for what in ["noise modelled, test", "test, modelled over ignored"] {
