@@ -4,6 +4,7 @@ pub mod calibrate;
 pub mod camera;
 pub mod chain;
 mod error;
+pub mod experiments;
 pub mod factors;
 pub mod geometry;
 pub mod recording;

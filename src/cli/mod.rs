@@ -6,6 +6,7 @@ mod completions;
 mod counts;
 mod demo;
 mod evaluate;
+mod experiment;
 mod folds;
 mod inputs;
 mod noise;
@@ -52,6 +53,7 @@ enum Command {
     Simulate(simulate::Simulate),
     Calibrate(calibrate::Calibrate),
     Evaluate(evaluate::Evaluate),
+    Experiment(experiment::ExperimentCommand),
     Completions(completions::Completions),
 }
 
@@ -71,6 +73,7 @@ impl Cli {
             Command::Simulate(simulate) => simulate.run(),
             Command::Calibrate(calibrate) => calibrate.run(self.json),
             Command::Evaluate(evaluate) => evaluate.run(),
+            Command::Experiment(experiment) => experiment.run(),
             Command::Completions(completions) => completions.run(),
         }
     }
