@@ -3,9 +3,12 @@ use super::answer::Answer;
 use super::counts::Counts;
 use super::inputs::{RigInput, read_recordings, read_rig};
 use super::survey::Survey;
-use super::words::{count, list};
+use super::table::Table;
+use super::words::{count, list, px};
 use clap::Args;
 use handeye::Error;
+use handeye::calibrate::Options;
+use handeye::doctor::{Diagnosis, examine};
 use handeye::rig::{Camera, Model, Parent, Rig};
 use serde_json::json;
 use std::path::PathBuf;
@@ -58,9 +61,30 @@ impl Check {
             let survey = Survey::new(rig, &recording);
             text += &format!("\n{survey}");
             json["recording"] = survey.json();
+            let diagnosis = examine(rig, &recording, &Options::default())?;
+            text += &format!("\n{}", tell(&diagnosis));
+            json["scores"] = diagnosis
+                .scores
+                .iter()
+                .map(|s| json!({"alternative": s.alternative, "median_px": s.median_px}))
+                .collect();
+            json["findings"] = diagnosis.findings.iter().map(|f| json!({"what": f.what, "change": f.change})).collect();
         }
         Ok(Answer::new(text, json))
     }
+}
+
+fn tell(diagnosis: &Diagnosis) -> String {
+    let mut table = Table::new(&["if", "median px"]);
+    for score in &diagnosis.scores {
+        let cell = score.median_px.map_or_else(|| "no fit".to_owned(), px);
+        table.row([score.alternative.to_owned(), cell]);
+    }
+    let mut text = if diagnosis.scores.is_empty() { String::new() } else { table.to_string() };
+    for finding in &diagnosis.findings {
+        text += &format!("\n  {}: {}\n", finding.what, finding.change);
+    }
+    text
 }
 
 fn describe(rig: &Rig, file: &str, counts: &Counts) -> String {

@@ -4,6 +4,8 @@ mod cli;
 mod cli_calibrate;
 mod determinism;
 mod deviations;
+mod doctor;
+
 mod folds;
 mod learning;
 mod malformed_input;
