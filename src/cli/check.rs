@@ -3,10 +3,15 @@ use super::answer::Answer;
 use super::counts::Counts;
 use super::inputs::{RigInput, read_recordings, read_rig};
 use super::survey::Survey;
-use super::words::{count, list};
+use super::table::Table;
+use super::words::{count, list, px};
 use clap::Args;
 use handeye::Error;
+<<<<<<< HEAD
 use handeye::calibrate::states_in_words;
+=======
+use handeye::calibrate::Options;
+use handeye::doctor::{Diagnosis, examine};
 use handeye::rig::{Camera, Model, Parent, Rig};
 use serde_json::json;
 use std::path::PathBuf;
@@ -62,6 +67,14 @@ impl Check {
             let states = states_in_words(rig, &recording)?;
             text += &format!("\nthe robot's state:\n{}", lines(&states));
             json["states"] = json!(states);
+            let diagnosis = examine(rig, &recording, &Options::default())?;
+            text += &format!("\n{}", tell(&diagnosis));
+            json["scores"] = diagnosis
+                .scores
+                .iter()
+                .map(|s| json!({"alternative": s.alternative, "median_px": s.median_px}))
+                .collect();
+            json["findings"] = diagnosis.findings.iter().map(|f| json!({"what": f.what, "change": f.change})).collect();
         }
         Ok(Answer::new(text, json))
     }
@@ -69,6 +82,19 @@ impl Check {
 
 fn lines(lines: &[String]) -> String {
     lines.iter().map(|line| format!("  {line}\n")).collect()
+}
+
+fn tell(diagnosis: &Diagnosis) -> String {
+    let mut table = Table::new(&["if", "median px"]);
+    for score in &diagnosis.scores {
+        let cell = score.median_px.map_or_else(|| "no fit".to_owned(), px);
+        table.row([score.alternative.to_owned(), cell]);
+    }
+    let mut text = if diagnosis.scores.is_empty() { String::new() } else { table.to_string() };
+    for finding in &diagnosis.findings {
+        text += &format!("\n  {}: {}\n", finding.what, finding.change);
+    }
+    text
 }
 
 fn describe(rig: &Rig, file: &str, counts: &Counts) -> String {

@@ -4,6 +4,7 @@ mod cli;
 mod cli_calibrate;
 mod determinism;
 mod deviations;
+mod doctor;
 mod experiments;
 mod folds;
 mod learning;

@@ -228,12 +228,7 @@ fn noise_of_actions_is_estimated_where_nothing_else_is_known() {
 // Sums of 100 squares of normalised errors: χ² with 100 degrees of freedom is between these bounds in 998 of 1,000 cases.
 #[test]
 fn standard_deviations_cover_the_truth_where_the_noise_of_joints_is_known() {
-    let fields: [(&str, fn(&Camera) -> Option<f64>); 4] = [
-        ("fx", |camera| camera.fx),
-        ("fy", |camera| camera.fy),
-        ("cx", |camera| camera.cx),
-        ("cy", |camera| camera.cy),
-    ];
+    let values = |camera: &Camera| [camera.fx, camera.fy, camera.cx, camera.cy].map(|value| value.expect("known"));
     let mut squares = [0.0; 8];
     for seed in 1..=100 {
         let truth = noisy(seed, |noise| noise.joints = 0.02);
@@ -244,8 +239,8 @@ fn standard_deviations_cover_the_truth_where_the_noise_of_joints_is_known() {
         let learned = learn(&rig, &record(&truth, 50, seed).recording).expect("enough data").rig;
         let sd = &learned.fit.as_ref().expect("learned").sd;
         for (index, (learned, truth)) in learned.cameras.iter().zip(&truth.cameras).enumerate() {
-            for (place, (field, value)) in fields.iter().enumerate() {
-                let error = value(learned).expect("learned") - value(truth).expect("given");
+            let errors = values(learned).into_iter().zip(values(truth)).map(|(learned, truth)| learned - truth);
+            for (place, (field, error)) in ["fx", "fy", "cx", "cy"].into_iter().zip(errors).enumerate() {
                 squares[4 * index + place] += (error / sd[&format!("cameras.{}.{field}", truth.name)][0]).powi(2);
             }
         }
