@@ -78,6 +78,7 @@ pub(crate) fn finish(
         gauge,
         findings: misfit.into_iter().chain(unseen).chain(verdict.findings).collect(),
         tip: deviations.tip,
+        targets: None,
     };
     Calibration { rig, report }
 }

@@ -16,10 +16,12 @@ mod robust;
 mod settle;
 mod setup;
 mod stage;
+mod targets;
 mod visual;
 
 pub use evaluate::{CameraErrors, Errors, Evaluation, evaluate};
 pub use report::{Calibration, Finding, Report, StageReport, TipDeviation};
+pub use targets::{Disagreement, TargetReport};
 
 use crate::Error;
 use crate::recording::Recording;
@@ -72,6 +74,9 @@ pub fn calibrate(
     options: &Options,
     observer: Observer<'_>,
 ) -> Result<Calibration, Error> {
+    if is_of_targets(recording) {
+        return targets::calibrate_targets(rig, recording, options, observer);
+    }
     let setup = Setup::new(rig, recording)?;
     let priors = Priors::new(&setup);
     let mut stages = Stages::new(&setup, &priors, observer);
@@ -91,6 +96,12 @@ pub fn calibrate(
     let deviations = deviations(&stages, &last, &state, &verdict);
     let reports = std::mem::take(&mut stages.reports);
     Ok(finish(&setup, &state, verdict, reports, converged, gauge, deviations))
+}
+
+/// True where targets are what there is to learn from. Where joints and pixels were recorded too, pixels say more.
+fn is_of_targets(recording: &Recording) -> bool {
+    let seen = |sample: &crate::recording::Sample| !sample.pixels.is_empty() && sample.joints.is_some();
+    recording.samples.iter().any(|sample| !sample.targets.is_empty()) && !recording.samples.iter().any(seen)
 }
 
 /// A camera that projects backwards or not at all was not learned.
