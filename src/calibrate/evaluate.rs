@@ -34,9 +34,9 @@ pub struct CameraErrors {
 /// How well a rig predicts a recording.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Evaluation {
-    /// Samples with joints and at least one comparable detection.
+    /// Samples with joints or a tip pose, and at least one comparable detection.
     pub samples: usize,
-    /// Detections left out because the rig does not know their camera or feature, or because their sample has no joints.
+    /// Detections left out because the rig does not know their camera or feature, or because their sample has neither joints nor a tip pose.
     pub rejected: usize,
     /// Over all cameras.
     pub total: Errors,
@@ -46,12 +46,13 @@ pub struct Evaluation {
     pub sample_median_px: Vec<Option<f64>>,
 }
 
-/// Predicts every pixel of a recording from its joints and compares.
+/// Predicts every pixel of a recording from its joints, or from its tip's pose where it has none, and compares.
 ///
 /// Fails with [`Error::Unusable`] where the rig is not complete or has another number of joints.
 pub fn evaluate(rig: &Rig, recording: &Recording) -> Result<Evaluation, Error> {
     let model = Model::new(rig)?;
-    if model.chain.len() != recording.joints.len() {
+    let has_joints = recording.samples.iter().any(|sample| sample.joints.is_some());
+    if has_joints && model.chain.len() != recording.joints.len() {
         return Err(Error::Unusable(format!(
             "the rig has {} joints, the recording {}",
             model.chain.len(),
@@ -84,7 +85,8 @@ pub fn evaluate(rig: &Rig, recording: &Recording) -> Result<Evaluation, Error> {
         .collect();
     if evaluation.total.observations == 0 {
         return Err(Error::NotEnoughData(
-            "nothing to compare: no sample has joints and a detection of a feature that the rig knows".into(),
+            "nothing to compare: no sample has joints, or a tip pose, and a detection of a feature that the rig knows"
+                .into(),
         ));
     }
     Ok(evaluation)
@@ -96,7 +98,8 @@ fn sample_errors<'a>(
     index: &'a Correspondence,
     sample: &'a Sample,
 ) -> impl Iterator<Item = (usize, f64, bool)> + 'a {
-    let links = sample.joints.as_ref().map(|joints| model.links(joints));
+    let from_pose = || sample.pose.map(|tip| vec![model.base, tip]);
+    let links = sample.joints.as_ref().map(|joints| model.links(joints)).or_else(from_pose);
     sample.pixels.iter().filter_map(move |detection| {
         let links = links.as_ref()?;
         let camera = index.cameras[detection.camera as usize]?;

@@ -23,10 +23,10 @@ pub(crate) fn finish(
     deviations: Deviations,
 ) -> Calibration {
     let distances = distances(setup, state);
-    let links: Vec<Vec<Pose>> = setup.joints.iter().map(|joints| state.model.links(joints)).collect();
+    let links: Vec<Vec<Pose>> = state.all_links(setup);
     let mut of_camera: Vec<Vec<(f64, bool)>> = vec![Vec::new(); setup.rig.cameras.len()];
     let mut left_out = vec![0; setup.rig.cameras.len()];
-    let mut used_samples = vec![false; setup.joints.len()];
+    let mut used_samples = vec![false; setup.len()];
     for ((seen, distance), active) in setup.observations.iter().zip(&distances).zip(&verdict.active) {
         if *active {
             let point = state.model.in_camera(seen.camera, seen.feature, &links[seen.sample]);
@@ -76,6 +76,8 @@ pub(crate) fn finish(
         stages,
         converged,
         gauge,
+        noise: None,
+        states: setup.states.words.clone(),
         findings: misfit.into_iter().chain(unseen).chain(verdict.findings).collect(),
         tip: deviations.tip,
         targets: None,
@@ -87,7 +89,9 @@ pub(crate) fn finish(
 fn learned(setup: &Setup, state: &State) -> Rig {
     let mut rig = setup.rig.clone();
     let model = &state.model;
-    rig.robot.base = Some(model.base);
+    if setup.states.chain {
+        rig.robot.base = Some(model.base);
+    }
     for (index, joint) in rig.robot.joints.iter_mut().enumerate() {
         let [offset, d, a, alpha, beta] = std::array::from_fn(|k| model.parameters[row(index) + k]);
         joint.offset = Some(wrapped(offset));

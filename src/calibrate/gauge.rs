@@ -13,8 +13,13 @@ use handeye_solvers::Pose;
 
 /// What is free in the last stage, and the rules that were needed, in words.
 pub(crate) fn end_to_end(setup: &Setup, state: &mut State, priors: &Priors) -> (Freedom, Vec<String>) {
-    let mut rules = Rules { setup, priors, freedom: Freedom::all(setup, true), words: Vec::new() };
+    let mut rules = Rules { setup, priors, freedom: Freedom::all(setup), words: Vec::new() };
     hold_fixed(setup, &mut rules.freedom);
+    if !setup.states.chain {
+        rules.freedom.base = [true; 6];
+        rules.freedom.parameters.fill(true);
+        return (rules.freedom, rules.words);
+    }
     rules.world(state);
     rules.first_and_last_row();
     rules.sliding_axes();
@@ -139,6 +144,9 @@ impl Rules<'_> {
 /// The same with the frames of base and tip held against the first axis and against what is fixed to the tip.
 pub(crate) fn with_frames_held(setup: &Setup, freedom: &Freedom) -> Freedom {
     let mut freedom = freedom.clone();
+    if !setup.states.chain {
+        return freedom;
+    }
     let (first, last) = ends(setup.rig.robot.convention);
     for &coordinate in first {
         freedom.parameters[coordinate] = true;
@@ -188,7 +196,8 @@ fn is_alpha_fixed(setup: &Setup, joint: usize) -> bool {
 /// Something given places the world: a camera in it, or a feature.
 pub(crate) fn world_is_known(setup: &Setup) -> bool {
     let rig = &setup.rig;
-    rig.cameras.iter().any(|camera| camera.parent == Parent::World && camera.pose.is_some())
+    setup.states.poses_beside_joints()
+        || rig.cameras.iter().any(|camera| camera.parent == Parent::World && camera.pose.is_some())
         || rig.features.iter().any(|feature| feature.parent == Parent::World && feature.xyz.is_some())
 }
 
@@ -209,7 +218,9 @@ pub(crate) fn length_is_known(setup: &Setup) -> bool {
         let features = rig.features.iter().filter(|feature| feature.parent == parent && feature.xyz.is_some());
         cameras.count() + features.count()
     };
-    rig.robot.joints.iter().any(|joint| joint.kind == JointKind::Prismatic || given(joint.d) || given(joint.a))
+    !setup.states.chain
+        || setup.states.poses_beside_joints()
+        || rig.robot.joints.iter().any(|joint| joint.kind == JointKind::Prismatic || given(joint.d) || given(joint.a))
         || of_parent(Parent::World) >= 2
         || of_parent(Parent::Tip) >= 2
 }

@@ -1,33 +1,87 @@
 //! The graph of a calibration: which nodes are free is a table, the factors are the same for every stage.
 use super::setup::Setup;
+use super::states::Start;
+use super::trunk::Trunk;
 use crate::chain::LINK_PARAMETERS;
-use crate::factors::{ForwardKinematics, Intrinsics, Reprojection};
-use crate::rig::{Model, Parent};
+use crate::factors::{Intrinsics, Reprojection};
+use crate::rig::Model;
 use handeye_solvers::{DynamicVector, FactorKey, Graph, Key, Loss, Pose, Vector};
-use std::sync::Arc;
 
 /// Where everything is now.
 #[derive(Clone, Debug)]
 pub(crate) struct State {
     /// Chain, cameras and features.
     pub model: Model,
-    /// `world_from_tip` of every sample, for the stages in which tips are free.
+    /// `world_from_tip` of every sample, for the stages in which tips are not derived.
     pub tips: Vec<Pose>,
+    /// Joints of every sample, where there is a chain.
+    pub joints: Vec<Vec<f64>>,
+    /// Of what recorded poses are, `tip_from_tool`: the frame of a learned chain's tip is not that of the recorded poses.
+    pub tool: Pose,
+    /// Whether a joint reading takes part; a wrong one is let go of.
+    pub trusted: Vec<bool>,
+    /// Whether the state of a sample is known well enough to take part.
+    pub placed: Vec<bool>,
+}
+
+impl State {
+    /// At what is known before anything is learned.
+    pub fn new(setup: &Setup) -> State {
+        let n = setup.model.chain.len();
+        let starts = &setup.states.starts;
+        let tip = |start: &Option<Start>| if let Some(Start::Tip(tip)) = start { *tip } else { Pose::identity() };
+        let joints = |start: &Option<Start>| {
+            start.as_ref().and_then(Start::joints).map_or_else(|| vec![0.0; n], <[f64]>::to_vec)
+        };
+        State {
+            model: setup.model.clone(),
+            tips: starts.iter().map(tip).collect(),
+            joints: starts.iter().map(joints).collect(),
+            tool: Pose::identity(),
+            trusted: vec![true; starts.len()],
+            placed: starts.iter().map(Option::is_some).collect(),
+        }
+    }
+
+    /// Poses of the links of a sample, as [`Model::links`] has them; without joints, of base and tip.
+    pub fn links(&self, setup: &Setup, sample: usize) -> Vec<Pose> {
+        if setup.states.chain {
+            self.model.links(&self.joints[sample])
+        } else {
+            vec![self.model.base, self.tips[sample]]
+        }
+    }
+
+    /// The same of all samples.
+    pub fn all_links(&self, setup: &Setup) -> Vec<Vec<Pose>> {
+        (0..setup.len()).map(|sample| self.links(setup, sample)).collect()
+    }
+}
+
+/// Where a stage has the poses of the tip from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Tips {
+    /// The images alone, in a world of their own.
+    Seen,
+    /// The chain, from the joints.
+    Chain,
+    /// Their readings, or commanded motions.
+    Read,
 }
 
 /// What is free, and what is known of it. Where a list is indexed by coordinate, true means held.
 #[derive(Clone, Debug)]
 pub(crate) struct Freedom {
-    /// Whether tips are derived from the chain (end to end) or free.
-    pub chain: bool,
+    /// Where the tips come from.
+    pub source: Tips,
     /// Coordinates of the base's step, of the chain's parameters, of each camera's step and intrinsics, of each feature.
     pub base: [bool; 6],
     pub parameters: Vec<bool>,
     pub cameras: Vec<[bool; 6]>,
     pub intrinsics: Vec<[bool; 12]>,
     pub features: Vec<[bool; 3]>,
-    /// Tips that are held, where tips are free.
-    pub tips: Vec<bool>,
+    /// Samples whose tip, or whose joints where there is a chain, are held.
+    pub states: Vec<bool>,
 }
 
 /// Gaussian priors: means, and standard deviations per coordinate, infinite where nothing is known.
@@ -49,46 +103,52 @@ pub(crate) struct Built {
     pub cameras: Vec<(Key<Pose>, Key<Intrinsics>)>,
     pub features: Vec<Key<Vector<3>>>,
     pub tips: Vec<Option<Key<Pose>>>,
+    pub joints: Vec<Option<Key<DynamicVector>>>,
+    pub tool: Key<Pose>,
     /// The factor of each observation that takes part.
     pub factors: Vec<(usize, FactorKey)>,
 }
 
 impl Freedom {
-    /// Everything free, with the chain or without.
-    pub fn all(setup: &Setup, chain: bool) -> Freedom {
+    /// Everything free but states that are known exactly.
+    pub fn all(setup: &Setup) -> Freedom {
         let unused = |camera: &crate::rig::ModelCamera| {
             let count = 4 + camera.model.distortion().len();
             std::array::from_fn(|i| i >= count)
         };
         let model = &setup.model;
         Freedom {
-            chain,
+            source: if setup.states.chain { Tips::Chain } else { Tips::Read },
             base: [false; 6],
             parameters: vec![false; model.parameters.len()],
             cameras: vec![[false; 6]; model.cameras.len()],
             intrinsics: model.cameras.iter().map(unused).collect(),
             features: vec![[false; 3]; model.features.len()],
-            tips: vec![false; setup.joints.len()],
+            states: setup.states.exact.clone(),
         }
     }
-}
 
-impl Freedom {
-    /// Everything held, end to end.
+    /// The same without the chain, from the images alone.
+    pub fn seen(setup: &Setup) -> Freedom {
+        Freedom { source: Tips::Seen, states: vec![false; setup.len()], ..Freedom::all(setup) }
+    }
+
+    /// Everything held.
     pub fn nothing(setup: &Setup) -> Freedom {
-        let all = Freedom::all(setup, true);
+        let all = Freedom::all(setup);
         Freedom {
             base: [true; 6],
             parameters: vec![true; all.parameters.len()],
             cameras: vec![[true; 6]; all.cameras.len()],
             intrinsics: vec![[true; 12]; all.intrinsics.len()],
             features: vec![[true; 3]; all.features.len()],
+            states: vec![true; all.states.len()],
             ..all
         }
     }
 }
 
-/// Builds the graph over the observations for which `takes_part` says so.
+/// Builds the graph over the observations for which `takes_part` says so, of samples whose state is placed.
 pub(crate) fn build(
     setup: &Setup,
     state: &State,
@@ -97,86 +157,66 @@ pub(crate) fn build(
     loss: Loss,
     takes_part: impl Fn(usize) -> bool,
 ) -> Built {
+    let mut built = Built::rig(state, freedom);
+    if !(setup.tool_is_open() && freedom.source == Tips::Chain) {
+        built.graph.hold(built.tool);
+    }
+    let mut trunk = Trunk::new(setup, state, freedom, &mut built);
     let model = &state.model;
-    let mut graph = Graph::new();
-    let base = graph.free(model.base);
-    hold(&mut graph, base, &freedom.base);
-    let parameters = graph.free(DynamicVector::from_column_slice(&model.parameters));
-    hold(&mut graph, parameters, &freedom.parameters);
-    let mut cameras = Vec::new();
-    for (index, camera) in model.cameras.iter().enumerate() {
-        let pose = graph.free(camera.pose);
-        hold(&mut graph, pose, &freedom.cameras[index]);
-        let intrinsics = graph.free(Intrinsics::from(camera.intrinsics));
-        hold(&mut graph, intrinsics, &freedom.intrinsics[index]);
-        cameras.push((pose, intrinsics));
-    }
-    let features: Vec<_> = model
-        .features
-        .iter()
-        .zip(&freedom.features)
-        .map(|(feature, held)| {
-            let key = graph.free(feature.xyz);
-            hold(&mut graph, key, held);
-            key
-        })
-        .collect();
-    let world = graph.held(Pose::identity());
-    let chain = Arc::new(model.chain.clone());
-    let n = chain.len();
-    let mut tips = vec![None; setup.joints.len()];
-    let mut factors = Vec::new();
-    let mut sample = usize::MAX;
-    let mut links: Vec<Option<Key<Pose>>> = Vec::new();
-    let mut joints = None;
-    for (index, observation) in setup.observations.iter().enumerate().filter(|(index, _)| takes_part(*index)) {
-        if observation.sample != sample {
-            sample = observation.sample;
-            links = vec![None; n + 1];
-            joints = None;
+    for (index, seen) in setup.observations.iter().enumerate() {
+        let placed = freedom.source == Tips::Seen || state.placed[seen.sample];
+        if !placed || !takes_part(index) {
+            continue;
         }
-        let mut carrier = |parent: Parent, graph: &mut Graph| match parent {
-            Parent::World => world,
-            Parent::Tip if !freedom.chain => *tips[sample].get_or_insert_with(|| {
-                let tip = graph.free(state.tips[sample]);
-                if freedom.tips[sample] {
-                    graph.hold(tip);
-                }
-                tip
-            }),
-            Parent::Tip | Parent::Link(_) => {
-                let upto = if let Parent::Link(joint) = parent { joint + 1 } else { n };
-                let joints =
-                    *joints.get_or_insert_with(|| graph.held(DynamicVector::from_column_slice(&setup.joints[sample])));
-                let link = *links[upto].get_or_insert_with(|| {
-                    graph.derive(ForwardKinematics { chain: chain.clone(), upto }, (base, parameters, joints))
-                });
-                if upto == n {
-                    tips[sample] = Some(link);
-                }
-                link
-            }
-        };
-        let (camera, feature) = (&model.cameras[observation.camera], &model.features[observation.feature]);
-        let (carrier, mount) = (carrier(feature.parent, &mut graph), carrier(camera.parent, &mut graph));
-        let (pose, intrinsics) = cameras[observation.camera];
-        let factor = Reprojection { pixel: observation.pixel, model: camera.model };
-        let settings = graph
-            .factor(factor, (carrier, features[observation.feature], mount, pose, intrinsics))
-            .sigma(setup.sigma())
-            .loss(loss);
-        factors.push((index, settings.key));
+        let (camera, feature) = (&model.cameras[seen.camera], &model.features[seen.feature]);
+        let carrier = trunk.carrier(feature.parent, seen.sample, &mut built);
+        let mount = trunk.carrier(camera.parent, seen.sample, &mut built);
+        let (pose, intrinsics) = built.cameras[seen.camera];
+        let factor = Reprojection { pixel: seen.pixel, model: camera.model };
+        let on = (carrier, built.features[seen.feature], mount, pose, intrinsics);
+        let key = built.graph.factor(factor, on).sigma(setup.sigma()).loss(loss).key;
+        built.factors.push((index, key));
     }
-    let mut built = Built { graph, base, parameters, cameras, features, tips, factors };
+    if freedom.source != Tips::Seen {
+        trunk.measure(loss, &mut built);
+    }
     built.add_priors(priors, freedom);
     built
 }
 
 impl Built {
+    /// The nodes of the rig, without samples.
+    fn rig(state: &State, freedom: &Freedom) -> Built {
+        let model = &state.model;
+        let mut graph = Graph::new();
+        let base = graph.free(model.base);
+        hold(&mut graph, base, &freedom.base);
+        let parameters = graph.free(DynamicVector::from_column_slice(&model.parameters));
+        hold(&mut graph, parameters, &freedom.parameters);
+        let mut cameras = Vec::new();
+        for (index, camera) in model.cameras.iter().enumerate() {
+            let pose = graph.free(camera.pose);
+            hold(&mut graph, pose, &freedom.cameras[index]);
+            let intrinsics = graph.free(Intrinsics::from(camera.intrinsics));
+            hold(&mut graph, intrinsics, &freedom.intrinsics[index]);
+            cameras.push((pose, intrinsics));
+        }
+        let mut features = Vec::new();
+        for (feature, held) in model.features.iter().zip(&freedom.features) {
+            let key = graph.free(feature.xyz);
+            hold(&mut graph, key, held);
+            features.push(key);
+        }
+        let n = state.tips.len();
+        let tool = graph.free(state.tool);
+        let (tips, joints, factors) = (vec![None; n], vec![None; n], Vec::new());
+        Built { graph, base, parameters, cameras, features, tips, joints, tool, factors }
+    }
+
     fn add_priors(&mut self, priors: &Priors, freedom: &Freedom) {
         let graph = &mut self.graph;
         let some = |sigmas: &[f64]| sigmas.iter().any(|sigma| sigma.is_finite());
-        if freedom.chain {
+        if freedom.source == Tips::Chain {
             if some(&priors.base) {
                 graph.prior(self.base, &priors.mean.base, &priors.base);
             }
@@ -188,7 +228,7 @@ impl Built {
         for (index, &(pose, intrinsics)) in self.cameras.iter().enumerate() {
             let mean = &priors.mean.cameras[index];
             // Without the chain, the world is not yet where the given poses are.
-            if freedom.chain && some(&priors.cameras[index]) {
+            if freedom.source != Tips::Seen && some(&priors.cameras[index]) {
                 graph.prior(pose, &mean.pose, &priors.cameras[index]);
             }
             if some(&priors.intrinsics[index]) {
@@ -196,7 +236,7 @@ impl Built {
             }
         }
         for (index, &feature) in self.features.iter().enumerate() {
-            if freedom.chain && some(&priors.features[index]) {
+            if freedom.source != Tips::Seen && some(&priors.features[index]) {
                 graph.prior(feature, &priors.mean.features[index].xyz, &priors.features[index]);
             }
         }
@@ -204,6 +244,7 @@ impl Built {
 
     /// Takes the graph's values over.
     pub fn read(&self, state: &mut State) {
+        state.tool = self.graph.value(self.tool);
         let model = &mut state.model;
         model.base = self.graph.value(self.base);
         model.parameters.copy_from_slice(self.graph.value(self.parameters).as_slice());
@@ -219,10 +260,15 @@ impl Built {
                 *tip = self.graph.value(*key);
             }
         }
+        for (joints, key) in state.joints.iter_mut().zip(&self.joints) {
+            if let Some(key) = key {
+                joints.copy_from_slice(self.graph.value(*key).as_slice());
+            }
+        }
     }
 }
 
-fn hold<V>(graph: &mut Graph, key: Key<V>, held: &[bool]) {
+pub(crate) fn hold<V>(graph: &mut Graph, key: Key<V>, held: &[bool]) {
     let coordinates: Vec<usize> = held.iter().enumerate().filter(|(_, held)| **held).map(|(i, _)| i).collect();
     if coordinates.len() == held.len() {
         graph.hold(key);

@@ -1,6 +1,6 @@
 //! Brings in what the first look could not place, and says what is missing where that is not possible.
 use super::graph::State;
-use super::setup::Setup;
+use super::setup::{Observation, Setup};
 use crate::Error;
 use crate::geometry::{resect_robust, triangulate};
 use nalgebra::Vector3;
@@ -19,7 +19,7 @@ pub(crate) fn join(
 ) -> Result<(), Error> {
     let mut cameras = cameras.to_vec();
     let mut features = features.to_vec();
-    let links: Vec<_> = setup.joints.iter().map(|joints| state.model.links(joints)).collect();
+    let links = state.all_links(setup);
     loop {
         let before = (cameras.clone(), features.clone());
         for (feature, placed) in features.iter_mut().enumerate().filter(|(_, placed)| !**placed) {
@@ -44,7 +44,8 @@ fn place_feature(
 ) -> bool {
     let (mut poses, mut bearings) = (Vec::new(), Vec::new());
     let model = &state.model;
-    for seen in setup.observations.iter().filter(|seen| seen.feature == feature && cameras[seen.camera]) {
+    let of_feature = |seen: &&Observation| seen.feature == feature && cameras[seen.camera] && state.placed[seen.sample];
+    for seen in setup.observations.iter().filter(of_feature) {
         let camera = &model.cameras[seen.camera];
         if let Some(bearing) = camera.model.unproject(&camera.intrinsics, seen.pixel) {
             let carrier = model.carrier(model.features[feature].parent, &links[seen.sample]);
@@ -73,7 +74,8 @@ fn place_camera(
     let model = &state.model;
     let lens = model.cameras[camera];
     let (mut points, mut bearings): (Vec<Vector3<f64>>, Vec<Vector3<f64>>) = (Vec::new(), Vec::new());
-    for seen in setup.observations.iter().filter(|seen| seen.camera == camera && features[seen.feature]) {
+    let of_camera = |seen: &&Observation| seen.camera == camera && features[seen.feature] && state.placed[seen.sample];
+    for seen in setup.observations.iter().filter(of_camera) {
         if let Some(bearing) = lens.model.unproject(&lens.intrinsics, seen.pixel) {
             let feature = &model.features[seen.feature];
             let in_world = model.carrier(feature.parent, &links[seen.sample]).transform(&feature.xyz);
@@ -81,7 +83,8 @@ fn place_camera(
             bearings.push(bearing);
         }
     }
-    match resect_robust(&points, &bearings, THRESHOLD_PX / lens.intrinsics[0], seed) {
+    let threshold = THRESHOLD_PX / lens.intrinsics[0] + 2.0 * setup.state_angle();
+    match resect_robust(&points, &bearings, threshold, seed) {
         Some(found) if found.inliers.len() >= 6 => {
             state.model.cameras[camera].pose = found.camera_from_points.inverse();
             true
@@ -119,7 +122,7 @@ fn missing_after(setup: &Setup, cameras: &[bool], features: &[bool]) -> Result<(
 
 /// Why no first look was possible: how much the cameras share, and which samples see too little.
 pub(crate) fn what_is_missing(setup: &Setup) -> Error {
-    let n_samples = setup.joints.len();
+    let n_samples = setup.len();
     let mut counts = vec![vec![0_usize; setup.rig.cameras.len()]; n_samples];
     for seen in &setup.observations {
         counts[seen.sample][seen.camera] += 1;

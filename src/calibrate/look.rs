@@ -66,8 +66,8 @@ fn frames(on_arm: bool) -> (Parent, Parent) {
 
 fn scenes(setup: &Setup, on_arm: bool, seed: u64) -> Vec<Scene> {
     let model = &setup.model;
-    let mut samples: Vec<Vec<Sighting>> = vec![Vec::new(); setup.joints.len()];
-    let every = setup.joints.len().div_ceil(LOOK);
+    let mut samples: Vec<Vec<Sighting>> = vec![Vec::new(); setup.len()];
+    let every = setup.len().div_ceil(LOOK);
     for seen in setup.observations.iter().filter(|seen| seen.sample % every == 0) {
         let camera = &model.cameras[seen.camera];
         if (camera.parent, model.features[seen.feature].parent) != frames(on_arm) {
@@ -87,13 +87,13 @@ fn scenes(setup: &Setup, on_arm: bool, seed: u64) -> Vec<Scene> {
 fn refine(seen: &mut Seen, on_arm: bool, width: f64, stages: &mut Stages<'_>) -> Result<(), Error> {
     let setup = stages.setup;
     let model = &setup.model;
-    let mut freedom = Freedom::all(setup, false);
+    let mut freedom = Freedom::seen(setup);
     // Images alone tell little of intrinsics: those that are given are trusted until the chain is there.
     for (held, known) in freedom.intrinsics.iter_mut().zip(&setup.intrinsics) {
         *held = std::array::from_fn(|i| held[i] || i >= 2 || known.focal);
     }
     freedom.cameras[seen.cameras.iter().position(|placed| *placed).unwrap_or(0)] = [true; 6];
-    freedom.tips[seen.placed.iter().position(|placed| *placed).unwrap_or(0)] = true;
+    freedom.states[seen.placed.iter().position(|placed| *placed).unwrap_or(0)] = true;
     let takes_part = |index: usize| {
         let o = &setup.observations[index];
         let parents = (model.cameras[o.camera].parent, model.features[o.feature].parent);
@@ -119,7 +119,7 @@ fn cameras_are_on_the_arm(setup: &Setup) -> bool {
 }
 
 fn seen_from(setup: &Setup, scene: &Scene, on_arm: bool) -> Option<Seen> {
-    let mut state = State { model: setup.model.clone(), tips: vec![Pose::identity(); setup.joints.len()] };
+    let mut state = State { tips: vec![Pose::identity(); setup.len()], ..State::new(setup) };
     for (camera, pose) in state.model.cameras.iter_mut().zip(&scene.cameras) {
         camera.pose = pose.unwrap_or(camera.pose);
     }

@@ -9,14 +9,20 @@ mod initialise;
 mod join;
 mod kinematics;
 mod look;
+mod motion;
 mod outliers;
 mod priors;
+mod readings;
 mod report;
 mod robust;
 mod settle;
 mod setup;
 mod stage;
+mod states;
 mod targets;
+mod trunk;
+mod unknown;
+mod variances;
 mod visual;
 
 pub use evaluate::{CameraErrors, Errors, Evaluation, evaluate};
@@ -25,11 +31,11 @@ pub use targets::{Disagreement, TargetReport};
 
 use crate::Error;
 use crate::recording::Recording;
-use crate::rig::Rig;
+use crate::rig::{Noise, Rig};
 use deviations::deviations;
 use finish::finish;
 use graph::{Priors, State};
-use handeye_solvers::{Loss, Pose};
+use handeye_solvers::Loss;
 use initialise::initialise;
 use setup::Setup;
 use stage::{Stage, Stages};
@@ -40,11 +46,14 @@ use std::ops::ControlFlow;
 pub struct Options {
     /// Seed of every random choice: the same seed gives the same rig, bit for bit.
     pub seed: u64,
+    /// Whether the noise of pixels, joints, poses and actions is estimated from the data (variance components). What the
+    /// rig states is where that starts; where it says that something recorded is exact, a guess is.
+    pub estimate_noise: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { seed: 1 }
+        Options { seed: 1, estimate_noise: false }
     }
 }
 
@@ -77,25 +86,77 @@ pub fn calibrate(
     if is_of_targets(recording) {
         return targets::calibrate_targets(rig, recording, options, observer);
     }
-    let setup = Setup::new(rig, recording)?;
-    let priors = Priors::new(&setup);
-    let mut stages = Stages::new(&setup, &priors, observer);
-    let mut state = if is_complete(&setup) {
-        let tips = vec![Pose::identity(); setup.joints.len()];
-        State { model: setup.model.clone(), tips }
-    } else {
-        initialise(options.seed, &mut stages)?
+    let mut rig = rig.clone();
+    if options.estimate_noise {
+        variances::guess(&mut rig.noise);
+    }
+    let mut setup = Setup::new(&rig, recording)?;
+    let (mut start, mut reports) = (None, Vec::new());
+    let mut round = 0;
+    loop {
+        let mut attempt = attempt(&setup, start.take(), options, observer)?;
+        reports.append(&mut attempt.reports);
+        let settled = attempt.noise.is_none_or(|noise| variances::change(&setup.rig.noise, &noise) < SETTLED);
+        if settled || round == ROUNDS {
+            let Attempt { state, verdict, converged, gauge, deviations, .. } = attempt;
+            let mut learned = finish(&setup, &state, verdict, reports, converged && settled, gauge, deviations);
+            learned.report.noise = options.estimate_noise.then_some(setup.rig.noise);
+            return Ok(learned);
+        }
+        setup.rig.noise = attempt.noise.unwrap_or(setup.rig.noise);
+        start = Some(attempt.state);
+        round += 1;
+    }
+}
+
+/// Rounds of the estimation of noise at most, and the relative change below which it has settled.
+const ROUNDS: usize = 30;
+const SETTLED: f64 = 0.01;
+
+/// A calibration under given noise.
+struct Attempt {
+    state: State,
+    verdict: outliers::Verdict,
+    reports: Vec<StageReport>,
+    converged: bool,
+    gauge: Vec<String>,
+    deviations: deviations::Deviations,
+    /// What the noise seems to be, where that is asked for.
+    noise: Option<Noise>,
+}
+
+/// Calibrates from a start, or from nothing.
+fn attempt(
+    setup: &Setup,
+    start: Option<State>,
+    options: &Options,
+    observer: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
+) -> Result<Attempt, Error> {
+    let priors = Priors::new(setup);
+    let mut stages = Stages::new(setup, &priors, observer);
+    let mut state = match start {
+        Some(state) => state,
+        None if is_complete(setup) => State::new(setup),
+        None => initialise(options.seed, &mut stages)?,
     };
-    let (mut freedom, gauge) = gauge::end_to_end(&setup, &mut state, &priors);
+    unknown::place_unknown(&mut state, &stages);
+    let (mut freedom, gauge) = gauge::end_to_end(setup, &mut state, &priors);
     let verdict = robust::fit(&mut state, &freedom, &mut stages)?;
     robust::place_moved(&mut state, &mut freedom, &verdict, &mut stages)?;
     let takes_part = |index: usize| verdict.active[index];
     let last = Stage { name: "end to end", freedom: &freedom, loss: Loss::Cauchy(TAILS), takes_part: &takes_part };
     let converged = stages.minimize(&last, &mut state)?.termination.converged();
-    check_cameras(&setup, &state)?;
+    check_cameras(setup, &state)?;
+    let noise = if options.estimate_noise {
+        Some(variances::estimate(&stages, &last, &state, &verdict).map_err(|error| {
+            Error::NotEnoughData(format!("the noise cannot be estimated where the data leave the rig open: {error}"))
+        })?)
+    } else {
+        None
+    };
     let deviations = deviations(&stages, &last, &state, &verdict);
     let reports = std::mem::take(&mut stages.reports);
-    Ok(finish(&setup, &state, verdict, reports, converged, gauge, deviations))
+    Ok(Attempt { state, verdict, reports, converged, gauge, deviations, noise })
 }
 
 /// True where targets are what there is to learn from. Where joints and pixels were recorded too, pixels say more.

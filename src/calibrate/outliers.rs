@@ -62,7 +62,9 @@ const MEDIAN_DISTANCE: f64 = 1.177_410_022_515_474_6;
 /// The yardstick is the stated noise, or the fit's own scatter (from the median distance) where that is larger.
 pub(crate) fn judge(setup: &Setup, state: &State, left_out: &[bool], moved: &[bool]) -> Verdict {
     let distances = distances(setup, state);
-    let mut counted: Vec<f64> = distances.iter().zip(left_out).filter(|(_, out)| !**out).map(|(d, _)| *d).collect();
+    let known = setup.observations.iter().map(|seen| state.placed[seen.sample]);
+    let used = distances.iter().zip(left_out).zip(known).filter(|((_, out), known)| !**out && *known);
+    let mut counted: Vec<f64> = used.map(|((distance, _), _)| *distance).collect();
     let sigma = (median(&mut counted) / MEDIAN_DISTANCE).max(setup.sigma());
     let mut images: BTreeMap<(usize, usize), Vec<f64>> = BTreeMap::new();
     for (seen, distance) in setup.observations.iter().zip(&distances) {
@@ -84,7 +86,7 @@ pub(crate) fn judge(setup: &Setup, state: &State, left_out: &[bool], moved: &[bo
     };
     let mut wrong_joints = BTreeSet::new();
     let mut wrong_images = BTreeSet::new();
-    for sample in 0..setup.joints.len() {
+    for sample in (0..setup.len()).filter(|&sample| state.placed[sample]) {
         let images: Vec<(usize, usize)> = of_sample(sample).filter(|key| !verdict.moved[key.1]).collect();
         let wrong: Vec<(usize, usize)> = images.iter().copied().filter(|key| bad(key)).collect();
         if !wrong.is_empty() && wrong.len() == images.len() {
@@ -99,7 +101,8 @@ pub(crate) fn judge(setup: &Setup, state: &State, left_out: &[bool], moved: &[bo
     }
     let mut single = 0;
     for ((index, seen), distance) in setup.observations.iter().enumerate().zip(&distances) {
-        let with_others = verdict.moved[seen.camera]
+        let with_others = !state.placed[seen.sample]
+            || verdict.moved[seen.camera]
             || wrong_joints.contains(&seen.sample)
             || wrong_images.contains(&(seen.sample, seen.camera));
         let alone = *distance > DETECTION * sigma;
@@ -108,6 +111,8 @@ pub(crate) fn judge(setup: &Setup, state: &State, left_out: &[bool], moved: &[bo
         single += usize::from(!with_others && alone);
     }
     report(setup, state, &medians, &wrong_joints, &wrong_images, sigma, &mut verdict);
+    let unknown = state.placed.iter().zip(&setup.samples).filter(|(placed, _)| !**placed);
+    verdict.findings.extend(unknown.map(|(_, &sample)| Finding::UnknownState { sample }));
     if single > 0 {
         verdict.findings.push(Finding::Outliers { count: single, of: distances.len() });
     }
@@ -136,7 +141,7 @@ fn bumped_cameras(
 
 /// Distance of every observation from where the state predicts it [px].
 pub(crate) fn distances(setup: &Setup, state: &State) -> Vec<f64> {
-    let links: Vec<_> = setup.joints.iter().map(|joints| state.model.links(joints)).collect();
+    let links = state.all_links(setup);
     let distance = |seen: &super::setup::Observation| {
         let [u, v] = state.model.pixel(seen.camera, seen.feature, &links[seen.sample]);
         (u - seen.pixel[0]).hypot(v - seen.pixel[1])
@@ -144,10 +149,21 @@ pub(crate) fn distances(setup: &Setup, state: &State) -> Vec<f64> {
     setup.observations.iter().map(distance).collect()
 }
 
+/// The same for one sample.
+pub(crate) fn distances_of(setup: &Setup, state: &State, sample: usize) -> Vec<f64> {
+    let links = state.links(setup, sample);
+    let of_sample = setup.observations.iter().filter(|seen| seen.sample == sample);
+    let distance = |seen: &super::setup::Observation| {
+        let [u, v] = state.model.pixel(seen.camera, seen.feature, &links);
+        (u - seen.pixel[0]).hypot(v - seen.pixel[1])
+    };
+    of_sample.map(distance).collect()
+}
+
 /// The camera that moved: its images are shifted as a whole by more than the noise of their detections explains, and lie
 /// further off than those of the other cameras. The worst, where there are several.
 pub(crate) fn moved_camera(setup: &Setup, state: &State, verdict: &Verdict) -> Option<usize> {
-    let links: Vec<_> = setup.joints.iter().map(|joints| state.model.links(joints)).collect();
+    let links = state.all_links(setup);
     let mut images: BTreeMap<(usize, usize), Vec<Vector2<f64>>> = BTreeMap::new();
     for (seen, _) in setup.observations.iter().zip(&verdict.left_out).filter(|(_, out)| !**out) {
         let predicted = state.model.pixel(seen.camera, seen.feature, &links[seen.sample]);
@@ -226,7 +242,7 @@ fn report(
 
 /// Median distance of what a sample's images show from what another sample's joints predict [px].
 fn median_with_joints_of(setup: &Setup, state: &State, moved: &[bool], sample: usize, joints: usize) -> f64 {
-    let links = state.model.links(&setup.joints[joints]);
+    let links = state.links(setup, joints);
     let of_sample = setup.observations.iter().filter(|seen| seen.sample == sample && !moved[seen.camera]);
     let mut distances: Vec<f64> = of_sample
         .map(|seen| {

@@ -1,6 +1,6 @@
 //! What a calibration did and found, and how good it is.
 use super::{CameraErrors, TargetReport};
-use crate::rig::Rig;
+use crate::rig::{Noise, Rig};
 
 /// A learned rig and how it came about.
 #[derive(Clone, Debug)]
@@ -34,6 +34,10 @@ pub struct Report {
     pub converged: bool,
     /// What the data cannot determine, in words, and how it was fixed.
     pub gauge: Vec<String>,
+    /// Where the robot's state is known from: which readings and actions take part, and how well they are known.
+    pub states: Vec<String>,
+    /// The noise as it was estimated, where that was asked for; it is the learned rig's.
+    pub noise: Option<Noise>,
     /// Samples, images and cameras that do not fit.
     pub findings: Vec<Finding>,
     /// Standard deviation of the tip over the recorded workspace; `None` where the data leave the rig open.
@@ -88,6 +92,11 @@ pub enum Finding {
         /// The sample whose images its joints fit, where the two were swapped.
         swapped_with: Option<usize>,
     },
+    /// Nothing was read of a sample's state, and its images do not determine it; it was left out.
+    UnknownState {
+        /// Index of the sample, from 0.
+        sample: usize,
+    },
     /// An image does not belong to its sample; it was left out.
     WrongImage {
         /// Index of the sample, from 0.
@@ -124,6 +133,12 @@ impl std::fmt::Display for Finding {
                     Some(other) => write!(f, "; they fit the images of sample {other}: the two are swapped"),
                     None => Ok(()),
                 }
+            }
+            Finding::UnknownState { sample } => {
+                write!(
+                    f,
+                    "sample {sample}: nothing was read of the robot's state, and its images do not determine it; it was left out"
+                )
             }
             Finding::WrongImage { sample, camera, median_px } => {
                 write!(f, "sample {sample}: the image of camera `{camera}` belongs to another pose ({median_px:.1} px)")

@@ -2,6 +2,7 @@
 use super::Finding;
 use super::graph::{Freedom, State};
 use super::outliers::{Verdict, judge, moved_camera};
+use super::readings::{self, wrong_readings};
 use super::setup::Setup;
 use super::stage::{Stage, Stages};
 use crate::Error;
@@ -27,7 +28,10 @@ pub(crate) fn fit(state: &mut State, freedom: &Freedom, stages: &mut Stages<'_>)
         widths = &WIDTHS[1..];
         let before = std::mem::take(&mut verdict.left_out);
         verdict = judge(setup, state, &before, &verdict.moved);
-        if verdict.left_out != before {
+        let wrong: Vec<usize> =
+            wrong_readings(setup, state).into_iter().filter(|&sample| state.trusted[sample]).collect();
+        if verdict.left_out != before || !wrong.is_empty() {
+            wrong.into_iter().for_each(|sample| state.trusted[sample] = false);
             check_rest(setup, &verdict)?;
             continue;
         }
@@ -35,19 +39,20 @@ pub(crate) fn fit(state: &mut State, freedom: &Freedom, stages: &mut Stages<'_>)
         verdict.moved[camera] = true;
         verdict = judge(setup, state, &before, &verdict.moved);
     }
+    verdict.findings.extend(readings::findings(setup, state));
     Ok(verdict)
 }
 
 /// Where most samples do not fit, something is wrong with all of them.
 fn check_rest(setup: &Setup, verdict: &Verdict) -> Result<(), Error> {
     let wrong = verdict.findings.iter().filter(|finding| matches!(finding, Finding::WrongJoints { .. })).count();
-    if 2 * wrong <= setup.joints.len() {
+    if 2 * wrong <= setup.len() {
         return Ok(());
     }
     Err(Error::NotEnoughData(format!(
         "the joints of {wrong} of {} samples do not lead to what the cameras saw: check that readings and images are of the \
          same moments, and the order, units and kinds of the joints",
-        setup.joints.len()
+        setup.len()
     )))
 }
 

@@ -2,6 +2,7 @@
 //!
 //! What was learned from nothing is known up to a similarity of space, and each frame of the chain up to half a turn about
 //! its z (which turns the signs of a and alpha). Given values decide both before the last stages begin.
+use super::anchor::Anchor;
 use super::evaluate::median;
 use super::gauge::{move_world, rescale};
 use super::graph::{State, row};
@@ -13,6 +14,9 @@ use handeye_solvers::Pose;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
 
+/// Of the choice of samples among which wrong poses are told from right ones.
+const SEED: u64 = 1;
+
 /// Moves everything that was learned to where given cameras, features and rows are, and takes given values over where they
 /// are held.
 pub(crate) fn settle(setup: &Setup, state: &mut State) {
@@ -23,12 +27,34 @@ pub(crate) fn settle(setup: &Setup, state: &mut State) {
         take_signs(setup, state);
         take_ends(setup, state);
     }
-    if let Some(given_from_learned) = given_world(setup, state) {
+    if !setup.states.chain {
+        // The world and its unit are those of the tip poses.
+    } else if let Some(given_from_learned) = given_world(setup, state) {
         move_world(state, &given_from_learned);
     } else if let (Some(base), false) = (setup.rig.robot.base, setup.chain_is_known()) {
         move_world(state, &(base * state.model.base.inverse()));
     }
+    take_poses(setup, state);
     hold_given(setup, state);
+}
+
+/// Moves the world, and scales what is learned, to where tip poses beside the joints say that the tip is.
+fn take_poses(setup: &Setup, state: &mut State) {
+    if !setup.states.poses_beside_joints() {
+        return;
+    }
+    let read: Vec<(Pose, Pose)> = (0..setup.len())
+        .filter(|&sample| state.placed[sample])
+        .filter_map(|sample| Some((state.model.tip(&state.joints[sample]), setup.states.poses[sample]?)))
+        .collect();
+    let (learned, read): (Vec<Pose>, Vec<Pose>) = read.into_iter().unzip();
+    let Some(anchor) = Anchor::find(&learned, &read, SEED) else { return };
+    if setup.tool_is_open() {
+        rescale(state, 1.0 / anchor.scale);
+        state.tool = anchor.tip.inverse();
+    }
+    let world = Pose { translation: anchor.world.translation / anchor.scale, ..anchor.world };
+    move_world(state, &world.inverse());
 }
 
 /// What lengths must be multiplied by: in the median over link lengths, and over distances between cameras and between

@@ -1,8 +1,10 @@
 //! What is known and what was measured, side by side: the rig completed by the recording's header, and its observations.
+use super::evaluate::Correspondence;
+use super::states::States;
 use crate::Error;
 use crate::camera::{CameraModel, PARAMETERS};
 use crate::chain::LINK_PARAMETERS;
-use crate::recording::{RecordedCamera, Recording};
+use crate::recording::{RecordedCamera, Recording, Sample};
 use crate::rig::{Camera, Feature, Joint, Model, ModelCamera, ModelFeature, Parameter, Parent, Rig};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
@@ -17,11 +19,11 @@ pub(crate) struct Setup {
     pub model: Model,
     /// Where each camera's numbers come from.
     pub intrinsics: Vec<KnownIntrinsics>,
-    /// Readings of every sample.
-    pub joints: Vec<Vec<f64>>,
+    /// What is known of the robot's state in every sample.
+    pub states: States,
     /// Index of every sample in the recording.
     pub samples: Vec<usize>,
-    /// Every detection of a sample that has joints, sample by sample.
+    /// Every detection of a sample that takes part, sample by sample.
     pub observations: Vec<Observation>,
     /// Names of cameras that are left out: their poses are unknown, and no sample with joints has a detection of theirs.
     pub unseen: Vec<String>,
@@ -70,36 +72,56 @@ impl Setup {
         }
         check_held(&rig)?;
         let model = placeholder_model(&rig);
-        let index = super::evaluate::Correspondence::new(&rig, recording);
-        let (mut joints, mut samples, mut observations): (Vec<_>, Vec<_>, Vec<_>) =
-            (Vec::new(), Vec::new(), Vec::new());
-        for (number, sample) in recording.samples.iter().enumerate() {
-            let Some(readings) = &sample.joints else { continue };
-            for detection in &sample.pixels {
+        let index = Correspondence::new(&rig, recording);
+        let (samples, states) = States::new(&rig, recording)?;
+        let mut observations = Vec::new();
+        for (state, &number) in samples.iter().enumerate() {
+            for detection in &recording.samples[number].pixels {
                 let camera = index.cameras[detection.camera as usize];
                 let feature = index.features[detection.feature as usize];
                 let (Some(camera), Some(feature)) = (camera, feature) else { continue };
-                observations.push(Observation { sample: samples.len(), camera, feature, pixel: detection.pixel });
+                observations.push(Observation { sample: state, camera, feature, pixel: detection.pixel });
             }
-            joints.push(readings.clone());
-            samples.push(number);
-        }
-        if samples.is_empty() {
-            return Err(Error::NotEnoughData("no sample of the recording has joints".into()));
         }
         if observations.is_empty() {
-            return Err(Error::NotEnoughData("no sample with joints has a detected feature".into()));
+            return Err(Error::NotEnoughData("no sample has a detected feature".into()));
         }
-        Ok(Setup { rig, model, intrinsics, joints, samples, observations, unseen })
+        Ok(Setup { rig, model, intrinsics, states, samples, observations, unseen })
     }
 
     /// True where every row of the chain is given.
     pub fn chain_is_known(&self) -> bool {
-        self.rig
-            .robot
-            .joints
-            .iter()
-            .all(|joint| joint.offset.is_some() && joint.d.is_some() && joint.a.is_some() && joint.alpha.is_some())
+        is_chain_known(&self.rig)
+    }
+
+    /// How many samples take part.
+    pub fn len(&self) -> usize {
+        self.samples.len()
+    }
+
+    /// True where the tip's motion is known before anything is learned: its poses, or joints of a known chain.
+    pub fn motion_is_known(&self) -> bool {
+        !self.states.chain || self.chain_is_known()
+    }
+
+    /// True where poses were recorded beside a chain that is learned, whose tip is in a frame of its own.
+    pub fn tool_is_open(&self) -> bool {
+        self.states.poses_beside_joints() && !self.chain_is_known()
+    }
+
+    /// About how far a first value of a state turns the tip wrongly [rad].
+    pub fn state_angle(&self) -> f64 {
+        let (states, noise) = (&self.states, &self.rig.noise);
+        let steps = 0.5 * self.len() as f64;
+        let variance = if !states.chain {
+            let walked = if states.poses.iter().all(Option::is_none) { steps } else { 0.0 };
+            noise.pose.rot.powi(2) + walked * noise.pose_action.rot.powi(2)
+        } else if states.readings.iter().all(Option::is_none) {
+            steps * noise.joint_action.powi(2) * self.model.chain.len() as f64
+        } else {
+            noise.joints.powi(2) * self.model.chain.len() as f64
+        };
+        variance.sqrt()
     }
 
     /// Standard deviation of a pixel coordinate [px].
@@ -110,6 +132,18 @@ impl Setup {
 
 fn name_joints(rig: &mut Rig, recording: &Recording) -> Result<(), Error> {
     let joints = &mut rig.robot.joints;
+    let moves = |sample: &Sample| sample.joints.is_some() || sample.joint_action.is_some();
+    if !recording.samples.iter().any(moves) {
+        return if is_chain_known(rig) {
+            Ok(())
+        } else {
+            Err(Error::Unusable(
+                "the recording has no joints, and so tells nothing of the chain, of which rows are unknown: give them, or take \
+                 [[robot.joints]] out of the rig"
+                    .into(),
+            ))
+        };
+    }
     if joints.is_empty() {
         joints.extend(recording.joints.iter().map(|name| Joint { name: name.clone(), ..Joint::default() }));
     }
@@ -184,11 +218,8 @@ fn leave_out_unseen_cameras(
     intrinsics: &mut Vec<KnownIntrinsics>,
     recording: &Recording,
 ) -> Vec<String> {
-    let with_joints = recording.samples.iter().filter(|sample| sample.joints.is_some());
-    let seeing: BTreeSet<&str> = with_joints
-        .flat_map(|sample| &sample.pixels)
-        .map(|seen| recording.cameras[seen.camera as usize].name.as_str())
-        .collect();
+    let seen = recording.samples.iter().flat_map(|sample| &sample.pixels);
+    let seeing: BTreeSet<&str> = seen.map(|seen| recording.cameras[seen.camera as usize].name.as_str()).collect();
     let unseen = |camera: &Camera| camera.pose.is_none() && !seeing.contains(camera.name.as_str());
     let names = rig.cameras.iter().filter(|camera| unseen(camera)).map(|camera| camera.name.clone()).collect();
     let mut stays = rig.cameras.iter().map(|camera| !unseen(camera)).collect::<Vec<_>>().into_iter();

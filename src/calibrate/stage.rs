@@ -35,6 +35,11 @@ impl<'a> Stages<'a> {
         build(self.setup, state, stage.freedom, self.priors, stage.loss, stage.takes_part)
     }
 
+    /// The graph over all observations of placed samples.
+    pub fn build_on(&self, freedom: &Freedom, loss: Loss, state: &State) -> Built {
+        build(self.setup, state, freedom, self.priors, loss, |_| true)
+    }
+
     /// Minimises, and moves the state there.
     pub fn minimize(&mut self, stage: &Stage<'_>, state: &mut State) -> Result<Report, Error> {
         let started = Instant::now();

@@ -36,6 +36,9 @@ pub struct Calibrate {
     /// Also learn K times without every K-th sample, and report how well those are predicted
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(2..))]
     folds: Option<u32>,
+    /// Estimate the noise of pixels, joints, poses and actions from the data; [noise] of the rig is where that starts
+    #[arg(long)]
+    estimate_noise: bool,
     /// Seed of every random choice: the same seed gives the same rig
     #[arg(long, value_name = "S", default_value_t = Options::default().seed)]
     seed: u64,
@@ -50,7 +53,7 @@ impl Calibrate {
         let recording = read_recordings(&self.recordings, input.as_ref())?;
         check_output(&self.output, &self.recordings)?;
         let (rig, text) = input.map_or_else(|| (Rig::default(), None), |input| (input.rig, Some(input.text)));
-        let options = Options { seed: self.seed };
+        let options = Options { seed: self.seed, estimate_noise: self.estimate_noise };
         let bar = Bar::new(is_json);
         let (folds, calibration, seconds) = on_threads(self.threads, || {
             let folds = self.folds.map(|n| Folds::new(&rig, &recording, n as usize, &options, &bar)).transpose()?;
@@ -101,6 +104,7 @@ fn describe(before: &Rig, learned: &Rig, report: &Report, seconds: f64) -> Strin
         text += &format!("\nthe tip's position is known to {}\n", tip_in_words(tip));
     }
     for (title, lines) in [
+        ("what is known of the robot's state", report.states.clone()),
         ("what the data leave open, and how it was fixed", report.gauge.clone()),
         ("what does not fit", report.findings.iter().map(Finding::to_string).collect()),
     ] {
@@ -195,6 +199,7 @@ pub fn report_json(report: &Report) -> Value {
         "stages": report.stages.iter().map(stage).collect::<Vec<_>>(),
         "converged": report.converged,
         "gauge": report.gauge,
+        "states": report.states,
         "findings": report.findings.iter().map(finding_json).collect::<Vec<_>>(),
         "tip_sd": report.tip.map(|tip| json!({ "median": tip.median, "largest": tip.largest, "metric": tip.metric })),
         "targets": report.targets.as_ref().map(targets_json),
@@ -211,6 +216,7 @@ fn finding_json(finding: &Finding) -> Value {
         Finding::WrongJoints { sample, median_px, swapped_with } => {
             json!({ "kind": "wrong_joints", "sample": sample, "median_px": median_px, "swapped_with": swapped_with })
         }
+        Finding::UnknownState { sample } => json!({ "kind": "unknown_state", "sample": sample }),
         Finding::WrongImage { sample, camera, median_px } => {
             json!({ "kind": "wrong_image", "sample": sample, "camera": camera, "median_px": median_px })
         }

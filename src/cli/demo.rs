@@ -38,7 +38,7 @@ impl Demo {
         let (recording, fresh) = (record(self.seed)?, record(self.seed.wrapping_add(1))?);
 
         let bar = Bar::new(is_json);
-        let options = Options { seed: self.seed };
+        let options = Options { seed: self.seed, ..Options::default() };
         let start = std::time::Instant::now();
         let learned = calibrate(&Rig::default(), &recording, &options, &mut |progress| bar.show("", progress))?;
         let seconds = start.elapsed().as_secs_f64();

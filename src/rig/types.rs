@@ -157,6 +157,13 @@ pub struct PoseNoise {
     pub rot: f64,
 }
 
+impl PoseNoise {
+    /// False where poses are exact.
+    pub fn is_noisy(self) -> bool {
+        self.xyz > 0.0 || self.rot > 0.0
+    }
+}
+
 impl Default for Noise {
     fn default() -> Self {
         Noise {

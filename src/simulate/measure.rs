@@ -47,11 +47,6 @@ pub(super) fn measure(truth: &Recording, rig: &Rig, options: &SimulateOptions) -
     measured
 }
 
-/// True where a pose is measured with an error, and so recorded.
-pub(super) fn is_noisy(noise: PoseNoise) -> bool {
-    noise.xyz > 0.0 || noise.rot > 0.0
-}
-
 /// Gaussian noise on everything that a sample holds.
 fn blur(sample: &mut Sample, noise: &Noise, random: &mut ChaCha8Rng) {
     let mut normal = |sd: f64| -> f64 { sd * random.sample::<f64, _>(StandardNormal) };
@@ -62,7 +57,7 @@ fn blur(sample: &mut Sample, noise: &Noise, random: &mut ChaCha8Rng) {
         let v = Vector3::from_fn(|_, _| normal(noise.xyz));
         Pose { rotation: so3::exp(&w) * pose.rotation, translation: pose.translation + v }
     };
-    sample.pose = sample.pose.filter(|_| is_noisy(noise.pose)).map(|pose| moved(pose, noise.pose));
+    sample.pose = sample.pose.filter(|_| noise.pose.is_noisy()).map(|pose| moved(pose, noise.pose));
     // On A itself: the residual of eq. 12 of the paper, P_next P⁻¹ against A, is white.
     sample.pose_action = sample.pose_action.map(|action| moved(action, noise.pose_action));
     for detection in &mut sample.pixels {

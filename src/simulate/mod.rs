@@ -84,7 +84,7 @@ fn check(options: &SimulateOptions) -> Result<(), Error> {
 fn record(rig: &Rig, model: &Model, views: &Views<'_>, positions: Vec<Vec<f64>>) -> Recording {
     let poses: Vec<Pose> = positions.iter().map(|joints| model.tip(joints)).collect();
     let acts_on_joints = rig.noise.joint_action > 0.0;
-    let acts_on_pose = measure::is_noisy(rig.noise.pose_action);
+    let acts_on_pose = rig.noise.pose_action.is_noisy();
     let (features, places) = in_natural_order(rig);
     let sample = |index: usize| {
         let joints = &positions[index];

@@ -12,5 +12,7 @@ mod readme;
 mod recording_files;
 mod rig_files;
 mod simulate;
+mod states;
+mod targets;
 mod tidy;
 mod wrong_data;

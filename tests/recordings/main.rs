@@ -1,9 +1,15 @@
 //! Real recordings and the peers' problems, where they are there: beside the project, or where HANDEYE_SHARED says.
 //!
 //! `cargo test --test recordings`; not part of the plain `cargo test`, which needs nothing but this project.
+mod dvrk;
+mod franka;
 mod peers;
 mod ur3e;
 
+use handeye::calibrate::{Calibration, Options, calibrate};
+use handeye::recording::Recording;
+use handeye::rig::Rig;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 /// The folder of the recordings, or `None` with a line that says so.
@@ -15,4 +21,9 @@ fn shared(below: &str) -> Option<PathBuf> {
     }
     eprintln!("NOTHING TO RUN ON: {} is not there (set HANDEYE_SHARED to its folder)", path.display());
     None
+}
+
+/// Learns with the default options, watched by nobody.
+fn learn(rig: &Rig, recording: &Recording) -> Calibration {
+    calibrate(rig, recording, &Options::default(), &mut |_| ControlFlow::Continue(())).expect("there is enough data")
 }

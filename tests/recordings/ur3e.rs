@@ -1,9 +1,8 @@
 //! A UR3e with a checkerboard on its flange, seen by four webcams, one of which moved; with swapped rows and wrong images.
-use crate::shared;
-use handeye::calibrate::{Calibration, Evaluation, Finding, Options, calibrate, evaluate};
+use crate::{learn, shared};
+use handeye::calibrate::{Calibration, Evaluation, Finding, evaluate};
 use handeye::recording::Recording;
 use handeye::rig::Rig;
-use std::ops::ControlFlow;
 
 /// Images that match no listed pose, by sample, all of cam4.
 const WRONG_IMAGES: [usize; 6] = [8, 13, 14, 30, 32, 37];
@@ -41,10 +40,6 @@ fn is_right(sample: usize, camera: &str) -> bool {
     !(camera == "cam4" && WRONG_IMAGES.contains(&sample)) && camera != "cam3"
 }
 
-fn learn(rig: &Rig, recording: &Recording) -> Calibration {
-    calibrate(rig, recording, &Options::default(), &mut |_| ControlFlow::Continue(())).expect("there is enough data")
-}
-
 fn held_out(learned: &Calibration, recording: &Recording) -> Evaluation {
     let fresh = part(recording, is_held_out, is_right);
     evaluate(&learned.rig, &fresh).expect("the learned rig is complete")
@@ -68,9 +63,6 @@ fn without_its_mistakes_it_predicts_held_out_samples_as_well_as_scipy() {
     let Some((rig, recording)) = read() else { return };
     let training = part(&recording, |sample| !is_held_out(sample) && sample != 24 && sample != 25, is_right);
     let mut three = rig.clone();
-    if let Some(v) = std::env::var("SG").ok() {
-        three.noise.pixels = v.parse().unwrap();
-    }
     three.cameras.retain(|camera| camera.name != "cam3");
     let learned = learn(&three, &training);
     let errors = held_out(&learned, &recording).total;

@@ -110,11 +110,26 @@ impl Account<'_> {
             stages: vec![stage],
             converged,
             gauge,
+            states: vec![self.states()],
+            noise: None,
             findings: Vec::new(),
             tip: None,
             targets: Some(targets),
         };
         Ok(Calibration { rig, report })
+    }
+
+    /// Where tips come from, in words.
+    fn states(&self) -> String {
+        let noise = &self.setup.rig.noise;
+        let clock = if self.setup.apart { ", smoothed over time" } else { "" };
+        let tips = match (self.setup.by_joints, noise.pose.xyz > 0.0 || noise.pose.rot > 0.0) {
+            (true, _) => "tips follow from the joints and the chain, which is learned too",
+            (false, true) => "tips are free under the noise of their poses",
+            (false, false) => "tips are where their poses say",
+        };
+        let targets = if noise.target.is_some() { "stated" } else { "estimated from their scatter" };
+        format!("{tips}{clock}; the noise of targets is {targets}")
     }
 
     fn learned(&self) -> Rig {

@@ -1,0 +1,261 @@
+//! The robot's state in every sample: what was read of it, what was commanded, and which of the paper's settings that makes.
+use super::evaluate::Correspondence;
+use crate::Error;
+use crate::recording::{Recording, Sample};
+use crate::rig::{Noise, Parent, PoseNoise, Rig};
+use handeye_solvers::Pose;
+
+/// What is known of the state of every sample. All lists are as long as the samples.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct States {
+    /// Whether tips follow from joints through a chain; otherwise their poses are what was read or commanded.
+    pub chain: bool,
+    /// The joints' readings.
+    pub readings: Vec<Option<Vec<f64>>>,
+    /// The tip's pose as it was read, where that says something of the tip.
+    pub poses: Vec<Option<Pose>>,
+    /// Commanded motions from a sample to the next, where they say something.
+    pub joint_actions: Vec<Option<Vec<f64>>>,
+    pub pose_actions: Vec<Option<Pose>>,
+    /// Whether the state is known exactly.
+    pub exact: Vec<bool>,
+    /// Readings, or what actions make of readings near by; `None` where nothing tells of the state but the images.
+    pub starts: Vec<Option<Start>>,
+    /// Which setting applies, in words.
+    pub words: Vec<String>,
+}
+
+/// A first value of a state.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Start {
+    Joints(Vec<f64>),
+    Tip(Pose),
+}
+
+impl Start {
+    pub fn joints(&self) -> Option<&[f64]> {
+        if let Start::Joints(joints) = self { Some(joints) } else { None }
+    }
+}
+
+impl States {
+    /// Which samples of a recording take part, and what is known of their states.
+    pub fn new(rig: &Rig, recording: &Recording) -> Result<(Vec<usize>, States), Error> {
+        let samples = &recording.samples;
+        let holds = |has: &dyn Fn(&Sample) -> bool| samples.iter().filter(|sample| has(sample)).count();
+        let joints = holds(&|sample| sample.joints.is_some());
+        let joint_actions = holds(&|sample| sample.joint_action.is_some());
+        let (poses, pose_actions) =
+            (holds(&|sample| sample.pose.is_some()), holds(&|sample| sample.pose_action.is_some()));
+        let chain = joints > 0 || joint_actions > 0;
+        if !chain && poses == 0 && pose_actions == 0 {
+            return Err(Error::NotEnoughData("no sample of the recording has joints, a tip pose or an action".into()));
+        }
+        let noise = &rig.noise;
+        let mut states = States { chain, ..States::default() };
+        let index = Correspondence::new(rig, recording);
+        let sees = |sample: &Sample| {
+            sample.pixels.iter().any(|seen| {
+                index.cameras[seen.camera as usize].is_some() && index.features[seen.feature as usize].is_some()
+            })
+        };
+        let mut taken = Vec::new();
+        for (number, sample) in samples.iter().enumerate() {
+            let linked = if chain { sample.joint_action.is_some() } else { sample.pose_action.is_some() };
+            let read = if chain { sample.joints.is_some() } else { sample.pose.is_some() };
+            let after = number > 0 && {
+                let before = &samples[number - 1];
+                if chain { before.joint_action.is_some() } else { before.pose_action.is_some() }
+            };
+            if linked || read || after || sees(sample) {
+                taken.push(number);
+                states.push(sample, noise);
+            }
+        }
+        states.drop_links(&taken);
+        if chain {
+            states.start_joints(recording.joints.len(), noise)
+        } else {
+            states.start_tips(noise)
+        }
+        states.words(noise, [joints, joint_actions, poses, pose_actions], samples.len());
+        if !chain {
+            check_poses(rig)?;
+        }
+        Ok((taken, states))
+    }
+
+    /// How many samples there are.
+    pub fn len(&self) -> usize {
+        self.readings.len()
+    }
+
+    /// True where recorded tip poses take part beside joints.
+    pub fn poses_beside_joints(&self) -> bool {
+        self.chain && self.poses.iter().any(Option::is_some)
+    }
+
+    fn push(&mut self, sample: &Sample, noise: &Noise) {
+        let chain = self.chain;
+        let use_pose = if chain { noise.pose.is_noisy() } else { true };
+        let exact = if chain {
+            sample.joints.is_some() && noise.joints == 0.0
+        } else {
+            sample.pose.is_some() && !noise.pose.is_noisy()
+        };
+        self.readings.push(sample.joints.clone().filter(|_| chain));
+        self.poses.push(sample.pose.filter(|_| use_pose));
+        self.joint_actions.push(sample.joint_action.clone().filter(|_| chain));
+        self.pose_actions.push(sample.pose_action.filter(|_| !chain || noise.pose_action.is_noisy()));
+        self.exact.push(exact);
+    }
+
+    /// Actions lead to the next sample of the recording: where that takes no part, nowhere.
+    fn drop_links(&mut self, taken: &[usize]) {
+        for (state, &sample) in taken.iter().enumerate() {
+            if taken.get(state + 1) != Some(&(sample + 1)) {
+                self.joint_actions[state] = None;
+                self.pose_actions[state] = None;
+            }
+        }
+    }
+
+    /// Readings; where there is none, what actions make of the nearest one before, else after. Without any reading, joints are
+    /// counted from the first state that an action leads from, which is zero.
+    fn start_joints(&mut self, count: usize, noise: &Noise) {
+        let moved = |from: &Vec<f64>, action: &Vec<f64>, sign: f64| -> Vec<f64> {
+            from.iter().zip(action).map(|(joint, action)| joint + sign * action).collect()
+        };
+        let starts = follow(
+            self.readings.clone(),
+            &self.joint_actions,
+            &mut self.exact,
+            noise.joint_action == 0.0,
+            vec![0.0; count],
+            |from, action| moved(from, action, 1.0),
+            |from, action| moved(from, action, -1.0),
+        );
+        self.starts = starts.into_iter().map(|start| start.map(Start::Joints)).collect();
+    }
+
+    /// The same for tip poses: P_next = A P. Without any reading, the first is the identity: the tip's frame is any.
+    fn start_tips(&mut self, noise: &Noise) {
+        let starts = follow(
+            self.poses.clone(),
+            &self.pose_actions,
+            &mut self.exact,
+            !noise.pose_action.is_noisy(),
+            Pose::identity(),
+            |from, action| *action * *from,
+            |from, action| action.inverse() * *from,
+        );
+        self.starts = starts.into_iter().map(|start| start.map(Start::Tip)).collect();
+    }
+
+    fn words(&mut self, noise: &Noise, [joints, joint_actions, poses, pose_actions]: [usize; 4], samples: usize) {
+        let pose = |noise: PoseNoise| format!("{} m, {} rad", noise.xyz, noise.rot);
+        let mut say = |words: String| self.words.push(words);
+        if self.chain && joints > 0 {
+            say(match noise.joints {
+                0.0 => format!("joint readings are exact, in {joints} of {samples} samples"),
+                sd => format!(
+                    "joint readings are noisy ({sd}), in {joints} of {samples} samples: joints are estimated (eq. 11)"
+                ),
+            });
+        }
+        if self.chain && joint_actions > 0 {
+            let counted = if joints == 0 { "; joints are counted from the first sample, which is zero" } else { "" };
+            say(match (noise.joint_action, noise.joints) {
+                (0.0, _) if joints == 0 => {
+                    format!("joint actions are executed exactly, in {joint_actions} samples{counted}")
+                }
+                (_, 0.0) if joints == samples => "joint actions are not used: all joints are known exactly".to_owned(),
+                (0.0, _) => "joint actions tell of joints that were not read".to_owned(),
+                (sd, _) => format!(
+                    "joint actions are noisy ({sd}), in {joint_actions} samples: joints are estimated (eq. 15){counted}"
+                ),
+            });
+        }
+        if self.chain && poses > 0 {
+            say(if noise.pose.is_noisy() {
+                format!("tip poses are noisy ({}), in {poses} samples, beside the joints", pose(noise.pose))
+            } else {
+                "tip poses are not used beside joints: [noise] pose does not say how good they are".to_owned()
+            });
+        }
+        if !self.chain && poses > 0 {
+            say(if noise.pose.is_noisy() {
+                format!(
+                    "tip poses are noisy ({}), in {poses} of {samples} samples: they are estimated (eq. 9)",
+                    pose(noise.pose)
+                )
+            } else {
+                format!("tip poses are exact, in {poses} of {samples} samples (eq. 9 in the limit)")
+            });
+        }
+        if !self.chain && pose_actions > 0 {
+            let from = if poses == 0 { "; the tip's frame is the world's in the first sample" } else { "" };
+            say(if noise.pose_action.is_noisy() {
+                let noise = pose(noise.pose_action);
+                format!(
+                    "pose actions are noisy ({noise}), in {pose_actions} samples: tip poses are estimated (eq. 13){from}"
+                )
+            } else {
+                format!("pose actions are executed exactly, in {pose_actions} samples{from}")
+            });
+        }
+        let unknown = self.starts.iter().filter(|start| start.is_none()).count();
+        if unknown > 0 {
+            say(format!("the states of {unknown} samples are known from their images alone"));
+        }
+    }
+}
+
+/// What is fixed to a link needs a chain.
+fn check_poses(rig: &Rig) -> Result<(), Error> {
+    let on_link = |parent: Parent| matches!(parent, Parent::Link(_));
+    let camera = rig.cameras.iter().find(|camera| on_link(camera.parent)).map(|camera| &camera.name);
+    let feature = rig.features.iter().find(|feature| on_link(feature.parent)).map(|feature| &feature.name);
+    match camera.or(feature) {
+        Some(name) => Err(Error::Unusable(format!(
+            "`{name}` is fixed to a link, but the recording has tip poses and no joints: nothing tells where the link is"
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Fills in states from actions, forwards and then backwards, and marks as exact what exact actions make of exact states.
+/// Where nothing was read, the first state from which an action leads is `first`, exactly.
+fn follow<S, A>(
+    mut starts: Vec<Option<S>>,
+    actions: &[Option<A>],
+    exact: &mut [bool],
+    actions_are_exact: bool,
+    first: S,
+    next: impl Fn(&S, &A) -> S,
+    previous: impl Fn(&S, &A) -> S,
+) -> Vec<Option<S>> {
+    if starts.iter().all(Option::is_none)
+        && let Some(index) = actions.iter().position(Option::is_some)
+    {
+        starts[index] = Some(first);
+        exact[index] = true;
+    }
+    let mut fill = |from: usize, to: usize, action: &A, go: &dyn Fn(&S, &A) -> S| {
+        if let (None, Some(start)) = (&starts[to], &starts[from]) {
+            starts[to] = Some(go(start, action));
+            exact[to] = actions_are_exact && exact[from];
+        }
+    };
+    for (state, action) in actions.iter().enumerate() {
+        if let Some(action) = action {
+            fill(state, state + 1, action, &next);
+        }
+    }
+    for (state, action) in actions.iter().enumerate().rev() {
+        if let Some(action) = action {
+            fill(state + 1, state, action, &previous);
+        }
+    }
+    starts
+}

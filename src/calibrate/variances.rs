@@ -1,0 +1,202 @@
+//! Standard deviations of what was measured and commanded, estimated from the data: variance components.
+//!
+//! The residuals of a group of measurements are smaller than its noise, for part of the noise goes into what is estimated. Each
+//! variance is the sum of its squared residuals over its redundancy, n - Σ h, with h the leverage of a measurement: what its own
+//! noise moves its prediction (Förstner 1979).
+use super::graph::{Built, Freedom, Priors, State, Tips};
+use super::outliers::{Verdict, distances};
+use super::stage::{Stage, Stages};
+use crate::factors::Motion;
+use crate::rig::Noise;
+use handeye_solvers::manifold::so3;
+use handeye_solvers::{Covariance, Error, Key, Pose};
+
+/// Where a recording holds something of which no noise is stated, the estimation starts here [px, rad or m].
+const ANGLE: f64 = 0.01;
+const LENGTH: f64 = 0.005;
+
+/// Variances are not taken below this share of those before in one round, nor standard deviations below a least one.
+const SHRINK: f64 = 0.01;
+const LEAST: f64 = 1e-7;
+
+/// Sum of squares and redundancy of a group of measurements.
+#[derive(Clone, Copy, Debug, Default)]
+struct Component {
+    squares: f64,
+    redundancy: f64,
+}
+
+impl Component {
+    fn add(&mut self, squares: f64, count: f64, leverage: f64) {
+        self.squares += squares;
+        self.redundancy += count - leverage;
+    }
+
+    /// The estimate, or the value before where nothing is left to tell.
+    fn sigma(&self, before: f64) -> f64 {
+        if before == 0.0 || self.redundancy < 1.0 {
+            return before;
+        }
+        (self.squares / self.redundancy).max(SHRINK * before * before).sqrt().max(LEAST)
+    }
+}
+
+/// Where a rig states no noise of what a recording holds, a first guess of it.
+pub(super) fn guess(noise: &mut Noise) {
+    let or = |value: &mut f64, guess: f64| *value = if *value > 0.0 { *value } else { guess };
+    or(&mut noise.joints, ANGLE);
+    or(&mut noise.joint_action, ANGLE);
+    for pose in [&mut noise.pose, &mut noise.pose_action] {
+        or(&mut pose.xyz, LENGTH);
+        or(&mut pose.rot, ANGLE);
+    }
+}
+
+/// One round of the estimation at the minimum of a stage.
+pub(super) fn estimate(
+    stages: &Stages<'_>,
+    last: &Stage<'_>,
+    state: &State,
+    verdict: &Verdict,
+) -> Result<Noise, Error> {
+    let setup = stages.setup;
+    let (states, before) = (&setup.states, setup.rig.noise);
+    let mut built = stages.build(last, state);
+    let motions: Vec<Option<Key<Pose>>> = (0..setup.len())
+        .map(|sample| {
+            let on = (built.tips[sample]?, *built.tips.get(sample + 1)?.as_ref()?);
+            states.pose_actions[sample]?;
+            Some(built.graph.derive(Motion, on))
+        })
+        .collect();
+    let free = count_free(last.freedom, &built) + if setup.tool_is_open() { 6 } else { 0 };
+    let mut covariance = Covariance::new(&built.graph)?;
+    let taken_by_priors = leverage_of_priors(stages.priors, last.freedom, &built, &mut covariance);
+    let mut taken = taken_by_priors;
+
+    let (mut joints, mut joint_action) = (Component::default(), Component::default());
+    let (mut rot, mut xyz) = (Component::default(), Component::default());
+    let (mut action_rot, mut action_xyz) = (Component::default(), Component::default());
+    for sample in (0..setup.len()).filter(|&sample| state.placed[sample]) {
+        if let (Some(key), Some(readings), true) =
+            (built.joints[sample], &states.readings[sample], state.trusted[sample])
+            && !states.exact[sample]
+        {
+            let squares = state.joints[sample].iter().zip(readings).map(|(a, b)| (a - b).powi(2)).sum();
+            let leverage = covariance.of(key).trace() / before.joints.powi(2);
+            joints.add(squares, readings.len() as f64, leverage);
+            taken += leverage;
+        }
+        if let (Some(action), true) = (&states.joint_actions[sample], before.joint_action > 0.0)
+            && let (Some(a), Some(b)) = (built.joints[sample], built.joints[sample + 1])
+        {
+            let moved = state.joints[sample + 1].iter().zip(&state.joints[sample]).map(|(next, now)| next - now);
+            let squares = moved.zip(action).map(|(moved, action)| (moved - action).powi(2)).sum();
+            let both = covariance.of(a).trace() + covariance.of(b).trace() - 2.0 * covariance.between(a, b).trace();
+            let leverage = both / before.joint_action.powi(2);
+            joint_action.add(squares, action.len() as f64, leverage);
+            taken += leverage;
+        }
+        let read = states.poses[sample].filter(|_| state.trusted[sample] && before.pose.is_noisy());
+        if let (Some(reading), Some(tip)) = (read, built.tips[sample]) {
+            let seen = built.graph.value(tip) * state.tool;
+            taken +=
+                add_pose(&mut rot, &mut xyz, &seen, &reading, &covariance.of(tip), before.pose.rot, before.pose.xyz);
+        }
+        if let (Some(action), Some(motion)) = (states.pose_actions[sample], motions[sample])
+            && before.pose_action.is_noisy()
+        {
+            let (moved, block) = (built.graph.value(motion), covariance.of(motion));
+            let (rot, xyz) = (before.pose_action.rot, before.pose_action.xyz);
+            taken += add_pose(&mut action_rot, &mut action_xyz, &moved, &action, &block, rot, xyz);
+        }
+    }
+    // All leverages add up to the number of free coordinates: what is left is that of the pixels.
+    let mut pixels = Component::default();
+    let used = distances(setup, state).into_iter().zip(&verdict.active).filter(|(_, active)| **active);
+    for (distance, _) in used {
+        pixels.add(distance * distance, 2.0, 0.0);
+    }
+    pixels.add(0.0, 0.0, (free as f64 - taken).max(0.0));
+    let mut noise = before;
+    noise.pixels = pixels.sigma(setup.sigma());
+    noise.joints = joints.sigma(before.joints);
+    noise.joint_action = joint_action.sigma(before.joint_action);
+    (noise.pose.rot, noise.pose.xyz) = (rot.sigma(before.pose.rot), xyz.sigma(before.pose.xyz));
+    noise.pose_action.rot = action_rot.sigma(before.pose_action.rot);
+    noise.pose_action.xyz = action_xyz.sigma(before.pose_action.xyz);
+    Ok(noise)
+}
+
+/// Largest relative change of a standard deviation.
+pub(super) fn change(a: &Noise, b: &Noise) -> f64 {
+    let all = |noise: &Noise| {
+        let Noise { pixels, joints, pose, joint_action, pose_action, target: _ } = *noise;
+        [pixels, joints, pose.xyz, pose.rot, joint_action, pose_action.xyz, pose_action.rot]
+    };
+    let pairs = all(a).into_iter().zip(all(b));
+    pairs.filter(|(a, _)| *a > 0.0).map(|(a, b)| (b / a - 1.0).abs()).fold(0.0, f64::max)
+}
+
+/// Adds the error of a pose to its two components, and returns its leverage.
+fn add_pose(
+    rot: &mut Component,
+    xyz: &mut Component,
+    pose: &Pose,
+    reading: &Pose,
+    block: &nalgebra::DMatrix<f64>,
+    rot_sd: f64,
+    xyz_sd: f64,
+) -> f64 {
+    let mut taken = 0.0;
+    let turned = so3::log(&(pose.rotation * reading.rotation.transpose())).norm_squared();
+    let moved = (pose.translation - reading.translation).norm_squared();
+    for (component, first, squares, sd) in [(rot, 0, turned, rot_sd), (xyz, 3, moved, xyz_sd)] {
+        if sd > 0.0 {
+            let leverage = (first..first + 3).map(|i| block[(i, i)]).sum::<f64>() / (sd * sd);
+            component.add(squares, 3.0, leverage);
+            taken += leverage;
+        }
+    }
+    taken
+}
+
+/// Free coordinates of the rig and of all states in the graph.
+fn count_free(freedom: &Freedom, built: &Built) -> usize {
+    let free = |held: &[bool]| held.iter().filter(|held| !**held).count();
+    let rig = free(&freedom.base)
+        + free(&freedom.parameters)
+        + freedom.cameras.iter().map(|held| free(held)).sum::<usize>()
+        + freedom.intrinsics.iter().map(|held| free(held)).sum::<usize>()
+        + freedom.features.iter().map(|held| free(held)).sum::<usize>();
+    let of_joints = built.joints.iter().zip(&freedom.states).filter(|(key, held)| key.is_some() && !**held).count();
+    let of_tips = match freedom.source {
+        Tips::Chain => 0,
+        _ => built.tips.iter().zip(&freedom.states).filter(|(key, held)| key.is_some() && !**held).count(),
+    };
+    rig + of_joints * (freedom.parameters.len() / crate::chain::LINK_PARAMETERS) + 6 * of_tips
+}
+
+/// What the priors of the rig's numbers decide, in coordinates.
+fn leverage_of_priors(priors: &Priors, freedom: &Freedom, built: &Built, covariance: &mut Covariance<'_>) -> f64 {
+    let mut sum = 0.0;
+    let mut add = |block: nalgebra::DMatrix<f64>, sigmas: &[f64], held: &[bool]| {
+        for (i, (sigma, held)) in sigmas.iter().zip(held).enumerate() {
+            if sigma.is_finite() && !held {
+                sum += block[(i, i)] / (sigma * sigma);
+            }
+        }
+    };
+    if freedom.source == Tips::Chain {
+        add(covariance.of(built.base), &priors.base, &freedom.base);
+        add(covariance.of(built.parameters), &priors.parameters, &freedom.parameters);
+    }
+    for (index, &(pose, intrinsics)) in built.cameras.iter().enumerate() {
+        add(covariance.of(pose), &priors.cameras[index], &freedom.cameras[index]);
+        add(covariance.of(intrinsics), &priors.intrinsics[index], &freedom.intrinsics[index]);
+    }
+    for (index, &feature) in built.features.iter().enumerate() {
+        add(covariance.of(feature), &priors.features[index], &freedom.features[index]);
+    }
+    sum
+}
