@@ -80,6 +80,7 @@ pub(crate) fn finish(
         states: setup.states.words(&setup.rig.noise),
         findings: misfit.into_iter().chain(unseen).chain(verdict.findings).collect(),
         tip: deviations.tip,
+        targets: None,
     };
     Calibration { rig, report }
 }

@@ -20,6 +20,7 @@ mod settle;
 mod setup;
 mod stage;
 mod states;
+mod targets;
 mod trunk;
 mod unknown;
 mod variances;
@@ -28,6 +29,7 @@ mod visual;
 pub use evaluate::{CameraErrors, Errors, Evaluation, evaluate};
 pub use report::{Calibration, Finding, Report, StageReport, TipDeviation};
 pub use selection::{NoiseTrial, select_noise};
+pub use targets::{Disagreement, TargetReport};
 
 use crate::Error;
 use crate::recording::Recording;
@@ -83,6 +85,9 @@ pub fn calibrate(
     options: &Options,
     observer: Observer<'_>,
 ) -> Result<Calibration, Error> {
+    if is_of_targets(recording) {
+        return targets::calibrate_targets(rig, recording, options, observer);
+    }
     let mut rig = rig.clone();
     if options.estimate_noise {
         variances::guess(&mut rig.noise, recording);
@@ -161,6 +166,12 @@ fn attempt(
     let deviations = deviations(&stages, &last, &state, &verdict);
     let reports = std::mem::take(&mut stages.reports);
     Ok(Attempt { state, verdict, reports, converged, gauge, deviations, noise })
+}
+
+/// True where targets are what there is to learn from. Where joints and pixels were recorded too, pixels say more.
+fn is_of_targets(recording: &Recording) -> bool {
+    let seen = |sample: &crate::recording::Sample| !sample.pixels.is_empty() && sample.joints.is_some();
+    recording.samples.iter().any(|sample| !sample.targets.is_empty()) && !recording.samples.iter().any(seen)
 }
 
 /// A camera that projects backwards or not at all was not learned.

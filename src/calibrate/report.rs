@@ -1,5 +1,5 @@
 //! What a calibration did and found, and how good it is.
-use super::CameraErrors;
+use super::{CameraErrors, TargetReport};
 use crate::rig::{Noise, Rig};
 
 /// A learned rig and how it came about.
@@ -42,6 +42,8 @@ pub struct Report {
     pub findings: Vec<Finding>,
     /// Standard deviation of the tip over the recorded workspace; `None` where the data leave the rig open.
     pub tip: Option<TipDeviation>,
+    /// What was learned from targets, where these and not pixels were used; the pixel distances are 0 then.
+    pub targets: Option<TargetReport>,
 }
 
 /// One stage of a calibration.

@@ -138,7 +138,7 @@ pub(super) fn estimate(
 /// Largest relative change of a standard deviation.
 pub(super) fn change(a: &Noise, b: &Noise) -> f64 {
     let all = |noise: &Noise| {
-        let Noise { pixels, joints, pose, joint_action, pose_action } = *noise;
+        let Noise { pixels, joints, pose, joint_action, pose_action, target: _ } = *noise;
         [pixels, joints, pose.xyz, pose.rot, joint_action, pose_action.xyz, pose_action.rot]
     };
     let pairs = all(a).into_iter().zip(all(b));

@@ -9,7 +9,7 @@ use super::words::{cameras_json, count, duration, error_table};
 use clap::Args;
 use handeye::Error;
 use handeye::calibrate::{
-    Calibration, Errors, Finding, NoiseTrial, Options, Report, TipDeviation, calibrate, select_noise,
+    Calibration, Errors, Finding, NoiseTrial, Options, Report, TargetReport, TipDeviation, calibrate, select_noise,
 };
 use handeye::rig::Rig;
 use serde_json::{Value, json};
@@ -111,7 +111,10 @@ fn describe(before: &Rig, learned: &Rig, report: &Report, seconds: f64) -> Strin
     let (samples, detections) = (count(report.samples, "sample"), count(report.observations, "detection"));
     let learned = learned_in_words(before, learned);
     let mut text = format!("{learned} from {samples} with {detections}, in {}\n\n", duration(seconds));
-    text += &error_table(&report.cameras, &together(report), report.rejected).to_string();
+    match &report.targets {
+        Some(targets) => text += &targets_in_words(targets, report.rejected),
+        None => text += &error_table(&report.cameras, &together(report), report.rejected).to_string(),
+    }
     if let Some(noise) = &report.noise {
         text += &format!("\nthe noise, estimated from the data: {}\n", noise::in_words(noise));
     }
@@ -129,6 +132,40 @@ fn describe(before: &Rig, learned: &Rig, report: &Report, seconds: f64) -> Strin
         }
     }
     text
+}
+
+fn targets_in_words(targets: &TargetReport, rejected: usize) -> String {
+    let (mm, deg) = (1e3 * targets.rms_xyz, targets.rms_rot.to_degrees());
+    let mut text = format!("targets fit to {mm:.3} mm and {deg:.4}° rms per axis; {rejected} left out\n");
+    if let Some((offset, sd)) = targets.time_offset {
+        text += &format!("the images' clock is {:.2} ms ahead of the robot's (± {:.2} ms)\n", 1e3 * offset, 1e3 * sd);
+    }
+    if let Some((scale, sd)) = targets.scale {
+        text += &format!(
+            "the targets' translations are {scale:.4} times (± {sd:.4}) the robot's: they are monocular, or the target's size is wrong\n"
+        );
+    }
+    for one in &targets.disagreements {
+        let (deg, mm) = (one.rot.to_degrees(), 1e3 * one.xyz);
+        text += &format!("the closed form of {} disagrees: {deg:.1}° and {mm:.0} mm from what was learned\n", one.name);
+    }
+    if targets.pixels_unused {
+        text += "pixels were recorded too, without joints, and were not used\n";
+    }
+    text
+}
+
+fn targets_json(targets: &TargetReport) -> Value {
+    let pair = |pair: Option<(f64, f64)>| pair.map(|(value, sd)| json!({ "value": value, "sd": sd }));
+    let one = |one: &handeye::calibrate::Disagreement| json!({ "name": one.name, "rot": one.rot, "xyz": one.xyz });
+    json!({
+        "rms_xyz": targets.rms_xyz,
+        "rms_rot": targets.rms_rot,
+        "time_offset": pair(targets.time_offset),
+        "scale": pair(targets.scale),
+        "disagreements": targets.disagreements.iter().map(one).collect::<Vec<_>>(),
+        "pixels_unused": targets.pixels_unused,
+    })
 }
 
 fn together(report: &Report) -> Errors {
@@ -184,6 +221,7 @@ pub fn report_json(report: &Report) -> Value {
         "noise": report.noise.as_ref().map(noise::json),
         "findings": report.findings.iter().map(finding_json).collect::<Vec<_>>(),
         "tip_sd": report.tip.map(|tip| json!({ "median": tip.median, "largest": tip.largest, "metric": tip.metric })),
+        "targets": report.targets.as_ref().map(targets_json),
         "tip_sd_mm": metric.map(|tip| 1e3 * tip.median),
         "tip_sd_largest_mm": metric.map(|tip| 1e3 * tip.largest),
     })

@@ -15,5 +15,6 @@ mod recording_files;
 mod rig_files;
 mod simulate;
 mod states;
+mod targets;
 mod tidy;
 mod wrong_data;
