@@ -4,6 +4,7 @@ use super::counts::learned_in_words;
 use super::folds::Folds;
 use super::inputs::{check_output, read_recordings, read_rig};
 use super::progress::Bar;
+use super::trust;
 use super::words::{cameras_json, count, duration, error_table};
 use clap::Args;
 use handeye::Error;
@@ -39,6 +40,9 @@ pub struct Calibrate {
     /// Estimate the noise of pixels, joints, poses and actions from the data; [noise] of the rig is where that starts
     #[arg(long)]
     estimate_noise: bool,
+    /// Also report how far leaving out each sample would move the tip, and which samples fit worst
+    #[arg(long)]
+    influence: bool,
     /// Seed of every random choice: the same seed gives the same rig
     #[arg(long, value_name = "S", default_value_t = Options::default().seed)]
     seed: u64,
@@ -53,7 +57,7 @@ impl Calibrate {
         let recording = read_recordings(&self.recordings, input.as_ref())?;
         check_output(&self.output, &self.recordings)?;
         let (rig, text) = input.map_or_else(|| (Rig::default(), None), |input| (input.rig, Some(input.text)));
-        let options = Options { seed: self.seed, estimate_noise: self.estimate_noise };
+        let options = Options { seed: self.seed, estimate_noise: self.estimate_noise, influence: self.influence };
         let bar = Bar::new(is_json);
         let (folds, calibration, seconds) = on_threads(self.threads, || {
             let folds = self.folds.map(|n| Folds::new(&rig, &recording, n as usize, &options, &bar)).transpose()?;
@@ -110,7 +114,7 @@ fn describe(before: &Rig, learned: &Rig, report: &Report, seconds: f64) -> Strin
             lines.iter().for_each(|line| text += &format!("  {line}\n"));
         }
     }
-    text
+    text + &trust::text(report)
 }
 
 fn together(report: &Report) -> Errors {
@@ -126,10 +130,15 @@ fn together(report: &Report) -> Errors {
 }
 
 fn tip_in_words(tip: &TipDeviation) -> String {
-    let TipDeviation { median, largest, metric } = *tip;
+    let TipDeviation { median, largest, by_data, metric } = *tip;
     if metric {
+        let of_priors = if by_data < 0.9 * median {
+            format!("; {:.3} mm but for what priors determine more than the data", 1e3 * by_data)
+        } else {
+            String::new()
+        };
         return format!(
-            "{:.3} mm (median standard deviation over the samples; largest {:.3} mm)",
+            "{:.3} mm (median standard deviation over the samples; largest {:.3} mm{of_priors})",
             1e3 * median,
             1e3 * largest
         );
@@ -164,9 +173,14 @@ pub fn report_json(report: &Report) -> Value {
         "gauge": report.gauge,
         "states": report.states,
         "findings": report.findings.iter().map(finding_json).collect::<Vec<_>>(),
-        "tip_sd": report.tip.map(|tip| json!({ "median": tip.median, "largest": tip.largest, "metric": tip.metric })),
+        "tip_sd": report.tip.map(|tip| json!({
+            "median": tip.median, "largest": tip.largest, "by_data": tip.by_data, "metric": tip.metric
+        })),
         "tip_sd_mm": metric.map(|tip| 1e3 * tip.median),
         "tip_sd_largest_mm": metric.map(|tip| 1e3 * tip.largest),
+        "tip_sd_by_data_mm": metric.map(|tip| 1e3 * tip.by_data),
+        "weak": report.weak.iter().map(trust::weak_json).collect::<Vec<_>>(),
+        "influence": trust::influence_json(&report.influence),
     })
 }
 
