@@ -3,7 +3,9 @@
 pub mod calibrate;
 pub mod camera;
 pub mod chain;
+pub mod doctor;
 mod error;
+pub mod experiments;
 pub mod factors;
 pub mod geometry;
 pub mod recording;

@@ -161,6 +161,7 @@ fn by_path(
                 (&freedom.intrinsics[camera][range.clone()], cameras[camera].1[range].to_vec())
             }
             Parameter::FeatureXyz(feature) => (&freedom.features[feature], features[feature].clone()),
+            Parameter::TargetPose(_) => continue,
         };
         if held.iter().any(|held| !held) {
             by_path.insert(parameter.path(&rig), sd);

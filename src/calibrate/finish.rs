@@ -78,11 +78,12 @@ pub(crate) fn finish(
         converged,
         gauge,
         noise: None,
-        states: setup.states.words.clone(),
+        states: setup.states.words(&setup.rig.noise),
         findings: misfit.into_iter().chain(unseen).chain(verdict.findings).collect(),
         tip: deviations.tip,
         weak: deviations.weak,
         influence: Vec::new(),
+        targets: None,
     };
     Calibration { rig, report }
 }

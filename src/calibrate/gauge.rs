@@ -184,6 +184,7 @@ fn hold_fixed(setup: &Setup, freedom: &mut Freedom) {
                 freedom.intrinsics[camera][intrinsics_of(field, distortion)].fill(true);
             }
             Parameter::FeatureXyz(feature) => freedom.features[feature] = [true; 3],
+            Parameter::TargetPose(_) => {}
         }
     }
 }

@@ -16,10 +16,12 @@ mod priors;
 mod readings;
 mod report;
 mod robust;
+mod selection;
 mod settle;
 mod setup;
 mod stage;
 mod states;
+mod targets;
 mod trunk;
 mod unknown;
 mod variances;
@@ -29,6 +31,8 @@ mod weak;
 pub use evaluate::{CameraErrors, Errors, Evaluation, evaluate};
 pub use influence::{Influence, most_influential, worst_fitting};
 pub use report::{Calibration, Finding, Report, StageReport, TipDeviation};
+pub use selection::{NoiseTrial, select_noise};
+pub use targets::{Disagreement, TargetReport};
 pub use weak::{Combination, DeterminedBy};
 
 use crate::Error;
@@ -87,9 +91,12 @@ pub fn calibrate(
     options: &Options,
     observer: Observer<'_>,
 ) -> Result<Calibration, Error> {
+    if is_of_targets(recording) {
+        return targets::calibrate_targets(rig, recording, options, observer);
+    }
     let mut rig = rig.clone();
     if options.estimate_noise {
-        variances::guess(&mut rig.noise);
+        variances::guess(&mut rig.noise, recording);
     }
     let mut setup = Setup::new(&rig, recording)?;
     let (mut start, mut reports) = (None, Vec::new());
@@ -109,6 +116,13 @@ pub fn calibrate(
         start = Some(attempt.state);
         round += 1;
     }
+}
+
+/// Which of the paper's settings applies to a recording, in words: what tells of the robot's state, and how well it is known.
+///
+/// Fails as [`calibrate()`] does where rig and recording do not fit together.
+pub fn states_in_words(rig: &Rig, recording: &Recording) -> Result<Vec<String>, Error> {
+    Ok(Setup::new(rig, recording)?.states.words(&rig.noise))
 }
 
 /// Rounds of the estimation of noise at most, and the relative change below which it has settled.
@@ -165,6 +179,12 @@ fn attempt(
         if options.influence { influence::influence(&honest, &freedom, &state, &verdict) } else { Vec::new() };
     let reports = std::mem::take(&mut stages.reports);
     Ok(Attempt { state, verdict, reports, converged, gauge, deviations, influence, noise })
+}
+
+/// True where targets are what there is to learn from. Where joints and pixels were recorded too, pixels say more.
+fn is_of_targets(recording: &Recording) -> bool {
+    let seen = |sample: &crate::recording::Sample| !sample.pixels.is_empty() && sample.joints.is_some();
+    recording.samples.iter().any(|sample| !sample.targets.is_empty()) && !recording.samples.iter().any(seen)
 }
 
 /// A camera that projects backwards or not at all was not learned.

@@ -65,7 +65,7 @@ impl Priors {
                 Parameter::FeatureXyz(feature) if !floats(rig.features[feature].parent) => {
                     priors.features[feature] = [sd(LENGTH); 3];
                 }
-                Parameter::CameraPose(_) | Parameter::FeatureXyz(_) => {}
+                Parameter::CameraPose(_) | Parameter::FeatureXyz(_) | Parameter::TargetPose(_) => {}
             }
         }
         priors

@@ -1,5 +1,5 @@
 //! What a calibration did and found, and how good it is.
-use super::{CameraErrors, Combination, Influence};
+use super::{CameraErrors, Combination, Influence, TargetReport};
 use crate::rig::{Noise, Rig};
 
 /// A learned rig and how it came about.
@@ -46,6 +46,8 @@ pub struct Report {
     pub weak: Vec<Combination>,
     /// What leaving out each sample would change, where [`Options::influence`](super::Options) asks for it.
     pub influence: Vec<Influence>,
+    /// What was learned from targets, where these and not pixels were used; the pixel distances are 0 then.
+    pub targets: Option<TargetReport>,
 }
 
 /// One stage of a calibration.

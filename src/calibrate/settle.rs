@@ -212,6 +212,7 @@ fn hold_given(setup: &Setup, state: &mut State) {
                     .copy_from_slice(&given.cameras[camera].intrinsics[range]);
             }
             Parameter::FeatureXyz(feature) => model.features[feature].xyz = given.features[feature].xyz,
+            Parameter::TargetPose(_) => {}
         }
     }
 }

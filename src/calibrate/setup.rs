@@ -255,6 +255,7 @@ fn check_held(rig: &Rig) -> Result<(), Error> {
         let parent = match parameter {
             Parameter::CameraPose(camera) => rig.cameras[camera].parent,
             Parameter::FeatureXyz(feature) => rig.features[feature].parent,
+            Parameter::TargetPose(target) => rig.targets[target].parent,
             _ => Parent::World,
         };
         if rig.is_fixed(&parameter) && parent != Parent::World && !is_chain_known(rig) {

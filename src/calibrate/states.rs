@@ -21,8 +21,8 @@ pub(crate) struct States {
     pub exact: Vec<bool>,
     /// Readings, or what actions make of readings near by; `None` where nothing tells of the state but the images.
     pub starts: Vec<Option<Start>>,
-    /// Which setting applies, in words.
-    pub words: Vec<String>,
+    /// How many poses say nothing, for want of their noise.
+    unused_poses: usize,
 }
 
 /// A first value of a state.
@@ -78,7 +78,6 @@ impl States {
         } else {
             states.start_tips(noise)
         }
-        states.words(noise, [joints, joint_actions, poses, pose_actions], samples.len());
         if !chain {
             check_poses(rig)?;
         }
@@ -105,6 +104,7 @@ impl States {
         };
         self.readings.push(sample.joints.clone().filter(|_| chain));
         self.poses.push(sample.pose.filter(|_| use_pose));
+        self.unused_poses += usize::from(sample.pose.is_some() && !use_pose);
         self.joint_actions.push(sample.joint_action.clone().filter(|_| chain));
         self.pose_actions.push(sample.pose_action.filter(|_| !chain || noise.pose_action.is_noisy()));
         self.exact.push(exact);
@@ -152,62 +152,60 @@ impl States {
         self.starts = starts.into_iter().map(|start| start.map(Start::Tip)).collect();
     }
 
-    fn words(&mut self, noise: &Noise, [joints, joint_actions, poses, pose_actions]: [usize; 4], samples: usize) {
-        let pose = |noise: PoseNoise| format!("{} m, {} rad", noise.xyz, noise.rot);
-        let mut say = |words: String| self.words.push(words);
+    /// Which setting of the paper applies, and what of the recording takes part.
+    pub fn words(&self, noise: &Noise) -> Vec<String> {
+        let samples = self.len();
+        let joints = self.readings.iter().flatten().count();
+        let joint_actions = self.joint_actions.iter().flatten().count();
+        let (poses, pose_actions) = (self.poses.iter().flatten().count(), self.pose_actions.iter().flatten().count());
+        let pose = |noise: PoseNoise| format!("{:.3e} m, {:.3e} rad", noise.xyz, noise.rot);
+        let of =
+            |count: usize| if count == samples { String::new() } else { format!(", in {count} of {samples} samples") };
+        let mut words = Vec::new();
         if self.chain && joints > 0 {
-            say(match noise.joints {
-                0.0 => format!("joint readings are exact, in {joints} of {samples} samples"),
-                sd => format!(
-                    "joint readings are noisy ({sd}), in {joints} of {samples} samples: joints are estimated (eq. 11)"
-                ),
+            words.push(match noise.joints {
+                0.0 => format!("joint readings are exact{}", of(joints)),
+                sd => {
+                    format!("joint readings are noisy ({sd:.3e} rad or m){}: joints are estimated (eq. 11)", of(joints))
+                }
             });
         }
         if self.chain && joint_actions > 0 {
             let counted = if joints == 0 { "; joints are counted from the first sample, which is zero" } else { "" };
-            say(match (noise.joint_action, noise.joints) {
-                (0.0, _) if joints == 0 => {
-                    format!("joint actions are executed exactly, in {joint_actions} samples{counted}")
+            words.push(match noise.joint_action {
+                _ if self.exact.iter().all(|exact| *exact) && joints > 0 => "joint actions tell nothing new: all joints are exact".to_owned(),
+                0.0 if joints == 0 => format!("joint actions are executed exactly{counted}"),
+                0.0 => "joint actions only start joints that were not read: [noise] joint_action does not say how good they are".to_owned(),
+                sd => format!("joint actions are noisy ({sd:.3e} rad or m): joints are estimated (eq. 15){counted}"),
+            });
+        }
+        if self.unused_poses > 0 {
+            words.push("tip poses are not used beside joints: [noise] pose does not say how good they are".to_owned());
+        }
+        if poses > 0 {
+            words.push(match (self.chain, noise.pose.is_noisy()) {
+                (true, _) => {
+                    format!("tip poses are noisy ({}){}, and used beside the joints", pose(noise.pose), of(poses))
                 }
-                (_, 0.0) if joints == samples => "joint actions are not used: all joints are known exactly".to_owned(),
-                (0.0, _) => "joint actions tell of joints that were not read".to_owned(),
-                (sd, _) => format!(
-                    "joint actions are noisy ({sd}), in {joint_actions} samples: joints are estimated (eq. 15){counted}"
-                ),
-            });
-        }
-        if self.chain && poses > 0 {
-            say(if noise.pose.is_noisy() {
-                format!("tip poses are noisy ({}), in {poses} samples, beside the joints", pose(noise.pose))
-            } else {
-                "tip poses are not used beside joints: [noise] pose does not say how good they are".to_owned()
-            });
-        }
-        if !self.chain && poses > 0 {
-            say(if noise.pose.is_noisy() {
-                format!(
-                    "tip poses are noisy ({}), in {poses} of {samples} samples: they are estimated (eq. 9)",
-                    pose(noise.pose)
-                )
-            } else {
-                format!("tip poses are exact, in {poses} of {samples} samples (eq. 9 in the limit)")
+                (false, true) => {
+                    format!("tip poses are noisy ({}){}: they are estimated (eq. 9)", pose(noise.pose), of(poses))
+                }
+                (false, false) => format!("tip poses are exact{} (eq. 9 in the limit)", of(poses)),
             });
         }
         if !self.chain && pose_actions > 0 {
             let from = if poses == 0 { "; the tip's frame is the world's in the first sample" } else { "" };
-            say(if noise.pose_action.is_noisy() {
-                let noise = pose(noise.pose_action);
-                format!(
-                    "pose actions are noisy ({noise}), in {pose_actions} samples: tip poses are estimated (eq. 13){from}"
-                )
+            words.push(if noise.pose_action.is_noisy() {
+                format!("pose actions are noisy ({}): tip poses are estimated (eq. 13){from}", pose(noise.pose_action))
             } else {
-                format!("pose actions are executed exactly, in {pose_actions} samples{from}")
+                format!("pose actions are executed exactly{from}")
             });
         }
         let unknown = self.starts.iter().filter(|start| start.is_none()).count();
         if unknown > 0 {
-            say(format!("the states of {unknown} samples are known from their images alone"));
+            words.push(format!("the states of {unknown} samples are known from their images alone"));
         }
+        words
     }
 }
 

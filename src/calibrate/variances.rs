@@ -7,6 +7,7 @@ use super::graph::{Built, Freedom, Priors, State, Tips};
 use super::outliers::{Verdict, distances};
 use super::stage::{Stage, Stages};
 use crate::factors::Motion;
+use crate::recording::{Recording, Sample};
 use crate::rig::Noise;
 use handeye_solvers::manifold::so3;
 use handeye_solvers::{Covariance, Error, Key, Pose};
@@ -42,13 +43,19 @@ impl Component {
 }
 
 /// Where a rig states no noise of what a recording holds, a first guess of it.
-pub(super) fn guess(noise: &mut Noise) {
-    let or = |value: &mut f64, guess: f64| *value = if *value > 0.0 { *value } else { guess };
-    or(&mut noise.joints, ANGLE);
-    or(&mut noise.joint_action, ANGLE);
-    for pose in [&mut noise.pose, &mut noise.pose_action] {
-        or(&mut pose.xyz, LENGTH);
-        or(&mut pose.rot, ANGLE);
+pub(super) fn guess(noise: &mut Noise, recording: &Recording) {
+    let holds = |has: &dyn Fn(&Sample) -> bool| recording.samples.iter().any(has);
+    let guess = |value: &mut f64, guess: f64, is_held: bool| {
+        if *value == 0.0 && is_held {
+            *value = guess;
+        }
+    };
+    guess(&mut noise.joints, ANGLE, holds(&|sample| sample.joints.is_some()));
+    guess(&mut noise.joint_action, ANGLE, holds(&|sample| sample.joint_action.is_some()));
+    let (poses, actions) = (holds(&|sample| sample.pose.is_some()), holds(&|sample| sample.pose_action.is_some()));
+    for (pose, is_held) in [(&mut noise.pose, poses), (&mut noise.pose_action, actions)] {
+        guess(&mut pose.xyz, LENGTH, is_held);
+        guess(&mut pose.rot, ANGLE, is_held);
     }
 }
 
@@ -131,7 +138,7 @@ pub(super) fn estimate(
 /// Largest relative change of a standard deviation.
 pub(super) fn change(a: &Noise, b: &Noise) -> f64 {
     let all = |noise: &Noise| {
-        let Noise { pixels, joints, pose, joint_action, pose_action } = *noise;
+        let Noise { pixels, joints, pose, joint_action, pose_action, target: _ } = *noise;
         [pixels, joints, pose.xyz, pose.rot, joint_action, pose_action.xyz, pose_action.rot]
     };
     let pairs = all(a).into_iter().zip(all(b));

@@ -3,12 +3,15 @@ use super::answer::Answer;
 use super::counts::learned_in_words;
 use super::folds::Folds;
 use super::inputs::{check_output, read_recordings, read_rig};
+use super::noise;
 use super::progress::Bar;
 use super::trust;
 use super::words::{cameras_json, count, duration, error_table};
 use clap::Args;
 use handeye::Error;
-use handeye::calibrate::{Calibration, Errors, Finding, Options, Report, TipDeviation, calibrate};
+use handeye::calibrate::{
+    Calibration, Errors, Finding, NoiseTrial, Options, Report, TargetReport, TipDeviation, calibrate, select_noise,
+};
 use handeye::rig::Rig;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -43,6 +46,9 @@ pub struct Calibrate {
     /// Also report how far leaving out each sample would move the tip, and which samples fit worst
     #[arg(long)]
     influence: bool,
+    /// Pick the noise of joints or poses, relative to that of pixels, by how well samples held out are predicted
+    #[arg(long, conflicts_with = "estimate_noise")]
+    select_noise: bool,
     /// Seed of every random choice: the same seed gives the same rig
     #[arg(long, value_name = "S", default_value_t = Options::default().seed)]
     seed: u64,
@@ -56,20 +62,29 @@ impl Calibrate {
         let input = self.rig.as_deref().map(read_rig).transpose()?;
         let recording = read_recordings(&self.recordings, input.as_ref())?;
         check_output(&self.output, &self.recordings)?;
-        let (rig, text) = input.map_or_else(|| (Rig::default(), None), |input| (input.rig, Some(input.text)));
+        let (mut rig, text) = input.map_or_else(|| (Rig::default(), None), |input| (input.rig, Some(input.text)));
         let options = Options { seed: self.seed, estimate_noise: self.estimate_noise, influence: self.influence };
         let bar = Bar::new(is_json);
-        let (folds, calibration, seconds) = on_threads(self.threads, || {
+        let (trials, folds, calibration, seconds) = on_threads(self.threads, || {
+            let mut trials = Vec::new();
+            if self.select_noise {
+                trials = select_noise(&rig, &recording, &options, &mut |progress| bar.show("", progress))?;
+                rig.noise = NoiseTrial::best(&trials).map_or(rig.noise, |best| best.noise);
+            }
             let folds = self.folds.map(|n| Folds::new(&rig, &recording, n as usize, &options, &bar)).transpose()?;
             let start = std::time::Instant::now();
             let calibration = calibrate(&rig, &recording, &options, &mut |progress| bar.show("", progress))?;
-            Ok((folds, calibration, start.elapsed().as_secs_f64()))
+            Ok((trials, folds, calibration, start.elapsed().as_secs_f64()))
         })?;
         drop(bar);
         let Calibration { rig: learned, report } = calibration;
         let output = self.output.display();
         let mut answer = Answer::new(describe(&rig, &learned, &report, seconds), report_json(&report));
         answer.json["seconds"] = json!(seconds);
+        if !trials.is_empty() {
+            answer.text += &format!("\n{}", noise::trials_table(&trials));
+            answer.json["noise_trials"] = noise::trials_json(&trials);
+        }
         if let Some(folds) = &folds {
             answer.text += &format!("\n{}", folds.text());
             answer.json["held_out"] = folds.json();
@@ -100,7 +115,13 @@ fn describe(before: &Rig, learned: &Rig, report: &Report, seconds: f64) -> Strin
     let (samples, detections) = (count(report.samples, "sample"), count(report.observations, "detection"));
     let learned = learned_in_words(before, learned);
     let mut text = format!("{learned} from {samples} with {detections}, in {}\n\n", duration(seconds));
-    text += &error_table(&report.cameras, &together(report), report.rejected).to_string();
+    match &report.targets {
+        Some(targets) => text += &targets_in_words(targets, report.rejected),
+        None => text += &error_table(&report.cameras, &together(report), report.rejected).to_string(),
+    }
+    if let Some(noise) = &report.noise {
+        text += &format!("\nthe noise, estimated from the data: {}\n", noise::in_words(noise));
+    }
     if let Some(tip) = &report.tip {
         text += &format!("\nthe tip's position is known to {}\n", tip_in_words(tip));
     }
@@ -115,6 +136,40 @@ fn describe(before: &Rig, learned: &Rig, report: &Report, seconds: f64) -> Strin
         }
     }
     text + &trust::text(report)
+}
+
+fn targets_in_words(targets: &TargetReport, rejected: usize) -> String {
+    let (mm, deg) = (1e3 * targets.rms_xyz, targets.rms_rot.to_degrees());
+    let mut text = format!("targets fit to {mm:.3} mm and {deg:.4}° rms per axis; {rejected} left out\n");
+    if let Some((offset, sd)) = targets.time_offset {
+        text += &format!("the images' clock is {:.2} ms ahead of the robot's (± {:.2} ms)\n", 1e3 * offset, 1e3 * sd);
+    }
+    if let Some((scale, sd)) = targets.scale {
+        text += &format!(
+            "the targets' translations are {scale:.4} times (± {sd:.4}) the robot's: they are monocular, or the target's size is wrong\n"
+        );
+    }
+    for one in &targets.disagreements {
+        let (deg, mm) = (one.rot.to_degrees(), 1e3 * one.xyz);
+        text += &format!("the closed form of {} disagrees: {deg:.1}° and {mm:.0} mm from what was learned\n", one.name);
+    }
+    if targets.pixels_unused {
+        text += "pixels were recorded too, without joints, and were not used\n";
+    }
+    text
+}
+
+fn targets_json(targets: &TargetReport) -> Value {
+    let pair = |pair: Option<(f64, f64)>| pair.map(|(value, sd)| json!({ "value": value, "sd": sd }));
+    let one = |one: &handeye::calibrate::Disagreement| json!({ "name": one.name, "rot": one.rot, "xyz": one.xyz });
+    json!({
+        "rms_xyz": targets.rms_xyz,
+        "rms_rot": targets.rms_rot,
+        "time_offset": pair(targets.time_offset),
+        "scale": pair(targets.scale),
+        "disagreements": targets.disagreements.iter().map(one).collect::<Vec<_>>(),
+        "pixels_unused": targets.pixels_unused,
+    })
 }
 
 fn together(report: &Report) -> Errors {
@@ -172,10 +227,12 @@ pub fn report_json(report: &Report) -> Value {
         "converged": report.converged,
         "gauge": report.gauge,
         "states": report.states,
+        "noise": report.noise.as_ref().map(noise::json),
         "findings": report.findings.iter().map(finding_json).collect::<Vec<_>>(),
         "tip_sd": report.tip.map(|tip| json!({
             "median": tip.median, "largest": tip.largest, "by_data": tip.by_data, "metric": tip.metric
         })),
+        "targets": report.targets.as_ref().map(targets_json),
         "tip_sd_mm": metric.map(|tip| 1e3 * tip.median),
         "tip_sd_largest_mm": metric.map(|tip| 1e3 * tip.largest),
         "tip_sd_by_data_mm": metric.map(|tip| 1e3 * tip.by_data),

@@ -3,9 +3,12 @@ use super::answer::Answer;
 use super::counts::Counts;
 use super::inputs::{RigInput, read_recordings, read_rig};
 use super::survey::Survey;
-use super::words::{count, list};
+use super::table::Table;
+use super::words::{count, list, px};
 use clap::Args;
 use handeye::Error;
+use handeye::calibrate::{Options, states_in_words};
+use handeye::doctor::{Diagnosis, examine};
 use handeye::rig::{Camera, Model, Parent, Rig};
 use serde_json::json;
 use std::path::PathBuf;
@@ -45,6 +48,7 @@ impl Check {
             "joints": rig.robot.joints.iter().map(|joint| &joint.name).collect::<Vec<_>>(),
             "cameras": rig.cameras.iter().map(|camera| &camera.name).collect::<Vec<_>>(),
             "features": rig.features.iter().map(|feature| &feature.name).collect::<Vec<_>>(),
+            "targets": rig.targets.iter().map(|target| &target.name).collect::<Vec<_>>(),
             "known": total.known,
             "unknown": total.unknown,
             "held": total.held,
@@ -58,9 +62,37 @@ impl Check {
             let survey = Survey::new(rig, &recording);
             text += &format!("\n{survey}");
             json["recording"] = survey.json();
+            let states = states_in_words(rig, &recording)?;
+            text += &format!("\nthe robot's state:\n{}", lines(&states));
+            json["states"] = json!(states);
+            let diagnosis = examine(rig, &recording, &Options::default())?;
+            text += &format!("\n{}", tell(&diagnosis));
+            json["scores"] = diagnosis
+                .scores
+                .iter()
+                .map(|s| json!({"alternative": s.alternative, "median_px": s.median_px}))
+                .collect();
+            json["findings"] = diagnosis.findings.iter().map(|f| json!({"what": f.what, "change": f.change})).collect();
         }
         Ok(Answer::new(text, json))
     }
+}
+
+fn lines(lines: &[String]) -> String {
+    lines.iter().map(|line| format!("  {line}\n")).collect()
+}
+
+fn tell(diagnosis: &Diagnosis) -> String {
+    let mut table = Table::new(&["if", "median px"]);
+    for score in &diagnosis.scores {
+        let cell = score.median_px.map_or_else(|| "no fit".to_owned(), px);
+        table.row([score.alternative.to_owned(), cell]);
+    }
+    let mut text = if diagnosis.scores.is_empty() { String::new() } else { table.to_string() };
+    for finding in &diagnosis.findings {
+        text += &format!("\n  {}: {}\n", finding.what, finding.change);
+    }
+    text
 }
 
 fn describe(rig: &Rig, file: &str, counts: &Counts) -> String {
@@ -84,6 +116,11 @@ fn describe(rig: &Rig, file: &str, counts: &Counts) -> String {
     } else {
         text += &format!("  features  {}: {}\n", features.len(), list(&features));
     }
+    let targets: Vec<String> =
+        rig.targets.iter().map(|target| format!("{} ({})", target.name, place(rig, target.parent))).collect();
+    if !targets.is_empty() {
+        text += &format!("  targets   {}: {}\n", targets.len(), list(&targets));
+    }
     if let Some(fit) = &rig.fit {
         let (samples, rejected) = (count(fit.samples, "sample"), fit.rejected);
         text += &format!("  learned   from {samples}, {:.3} px rms, {rejected} detections left out\n", fit.rms_px);
@@ -104,10 +141,13 @@ fn describe(rig: &Rig, file: &str, counts: &Counts) -> String {
 fn describe_camera(rig: &Rig, camera: &Camera) -> String {
     let size = camera.size.map_or_else(String::new, |[width, height]| format!(", {width} x {height}"));
     let model = camera.model.map_or_else(String::new, |model| format!(", {}", model.name()));
-    let place = match camera.parent {
-        Parent::World => "in the world",
-        Parent::Tip => "on the tip",
-        Parent::Link(joint) => &format!("on link {}", rig.robot.joints[joint].name),
-    };
-    format!("{} ({place}{model}{size})", camera.name)
+    format!("{} ({}{model}{size})", camera.name, place(rig, camera.parent))
+}
+
+fn place(rig: &Rig, parent: Parent) -> String {
+    match parent {
+        Parent::World => "in the world".to_owned(),
+        Parent::Tip => "on the tip".to_owned(),
+        Parent::Link(joint) => format!("on link {}", rig.robot.joints[joint].name),
+    }
 }

@@ -4,7 +4,7 @@ use handeye::rig::{Parameter, Rig};
 use serde_json::{Map, Value, json};
 
 /// Kinds of parameters, in the order of [`Rig::parameters`].
-const KINDS: [&str; 5] = ["base", "joint parameters", "camera poses", "intrinsics", "features"];
+const KINDS: [&str; 6] = ["base", "joint parameters", "camera poses", "intrinsics", "features", "targets"];
 
 /// Parameters of one kind. A base that is held and left out is the identity, and counts as held.
 #[derive(Clone, Copy, Default)]
@@ -80,6 +80,7 @@ fn kind(parameter: &Parameter) -> usize {
         Parameter::CameraPose(_) => 2,
         Parameter::CameraField { .. } => 3,
         Parameter::FeatureXyz(_) => 4,
+        Parameter::TargetPose(_) => 5,
     }
 }
 

@@ -6,8 +6,10 @@ mod completions;
 mod counts;
 mod demo;
 mod evaluate;
+mod experiment;
 mod folds;
 mod inputs;
+mod noise;
 mod progress;
 mod simulate;
 mod survey;
@@ -52,6 +54,7 @@ enum Command {
     Simulate(simulate::Simulate),
     Calibrate(calibrate::Calibrate),
     Evaluate(evaluate::Evaluate),
+    Experiment(experiment::ExperimentCommand),
     Completions(completions::Completions),
 }
 
@@ -71,6 +74,7 @@ impl Cli {
             Command::Simulate(simulate) => simulate.run(),
             Command::Calibrate(calibrate) => calibrate.run(self.json),
             Command::Evaluate(evaluate) => evaluate.run(),
+            Command::Experiment(experiment) => experiment.run(),
             Command::Completions(completions) => completions.run(),
         }
     }

@@ -4,11 +4,15 @@ mod joint_action;
 mod joint_reading;
 mod pose_action;
 mod pose_reading;
+mod readings;
 mod reprojection;
+mod target;
 
 pub use forward_kinematics::ForwardKinematics;
 pub use joint_action::JointAction;
 pub use joint_reading::JointReading;
 pub use pose_action::{Motion, PoseAction};
 pub use pose_reading::PoseReading;
+pub use readings::{JointReadings, Polynomial, PoseReadings};
 pub use reprojection::{Intrinsics, Reprojection};
+pub use target::TargetSeen;

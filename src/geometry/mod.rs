@@ -3,6 +3,7 @@
 //! Points are in metres (or any other unit), bearings are unit directions in a camera's frame
 //! (`CameraModel::unproject`), so that every camera model fits. Degenerate input gives `None` or an empty list.
 mod alignment;
+mod daniilidis;
 mod essential;
 mod five_point;
 mod hand_eye;
@@ -17,6 +18,7 @@ mod sampson;
 mod triangulation;
 
 pub use alignment::{Similarity, align, align_similarity};
+pub use daniilidis::hand_eye_daniilidis;
 pub use essential::{decompose, essential, in_front_of_both};
 pub use five_point::five_point;
 pub use hand_eye::{hand_eye_park, robot_world};

@@ -24,6 +24,8 @@ pub enum Parameter {
     },
     /// `features.NAME.xyz`
     FeatureXyz(usize),
+    /// `targets.NAME.pose`
+    TargetPose(usize),
 }
 
 /// A number of a joint.
@@ -114,12 +116,13 @@ impl Parameter {
                 format!("cameras.{}.{}", rig.cameras[camera].name, field.name())
             }
             Parameter::FeatureXyz(feature) => format!("features.{}.xyz", rig.features[feature].name),
+            Parameter::TargetPose(target) => format!("targets.{}.pose", rig.targets[target].name),
         }
     }
 }
 
 impl Rig {
-    /// Everything that can be learned of this rig: base, joints, cameras, features, each in the file's order.
+    /// Everything that can be learned of this rig: base, joints, cameras, features, targets, each in the file's order.
     ///
     /// Left out are the `beta` of joints that have none and the distortion of cameras whose model has none.
     pub fn parameters(&self) -> Vec<Parameter> {
@@ -136,6 +139,7 @@ impl Rig {
             parameters.extend(fields.map(|&field| Parameter::CameraField { camera: index, field }));
         }
         parameters.extend((0..self.features.len()).map(Parameter::FeatureXyz));
+        parameters.extend((0..self.targets.len()).map(Parameter::TargetPose));
         parameters
     }
 
@@ -156,6 +160,7 @@ impl Rig {
                 }
             }
             Parameter::FeatureXyz(feature) => self.features[feature].xyz.is_some(),
+            Parameter::TargetPose(target) => self.targets[target].pose.is_some(),
         }
     }
 

@@ -31,7 +31,7 @@ impl Rig {
             Error::at(file_name, text, offset, error.message().to_owned())
         })?;
         let root = Node::root(&source, document.as_table());
-        let fields = root.table(&["name", "robot", "cameras", "features", "noise", "estimate", "fit"])?;
+        let fields = root.table(&["name", "robot", "cameras", "features", "targets", "noise", "estimate", "fit"])?;
         let node = |key: &str| fields.field(key).map(|field| field.value);
         let mut rig = Rig { name: fields.optional("name", |node| node.text().map(str::to_owned))?, ..Rig::default() };
         if let Some(node) = node("robot") {
@@ -39,6 +39,7 @@ impl Rig {
         }
         rig.cameras = views::read_cameras(node("cameras"), &rig.robot.joints)?;
         rig.features = views::read_features(node("features"), &rig.robot.joints)?;
+        rig.targets = views::read_targets(node("targets"), &rig.robot.joints)?;
         if let Some(node) = node("noise") {
             rig.noise = noise::read_noise(&node)?;
         }

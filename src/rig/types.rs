@@ -15,6 +15,8 @@ pub struct Rig {
     pub cameras: Vec<Camera>,
     /// The features, in the file's order.
     pub features: Vec<Feature>,
+    /// The targets, in the file's order.
+    pub targets: Vec<Target>,
     /// Standard deviations of what is measured and commanded.
     pub noise: Noise,
     /// What is held, and what is known only roughly.
@@ -70,7 +72,7 @@ pub struct Limits {
     pub acceleration: Option<f64>,
 }
 
-/// What a camera or a feature is fixed to.
+/// What a camera, a feature or a target is fixed to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Parent {
     /// The world.
@@ -118,6 +120,17 @@ pub struct Feature {
     pub xyz: Option<[f64; 3]>,
 }
 
+/// A target: a tag or a board, which a detector reports as a whole pose.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Target {
+    /// Its name.
+    pub name: String,
+    /// What it is fixed to.
+    pub parent: Parent,
+    /// `parent_from_target`.
+    pub pose: Option<Pose>,
+}
+
 /// Standard deviations. 0 for joints and poses: readings are exact; for actions: nothing was commanded or they are exact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
@@ -127,6 +140,8 @@ pub struct Noise {
     pub joints: f64,
     /// Of a recorded tip pose.
     pub pose: PoseNoise,
+    /// Of a target's pose in a camera's frame; `None` is estimated from how the poses scatter.
+    pub target: Option<PoseNoise>,
     /// Of a commanded joint motion [rad or m].
     pub joint_action: f64,
     /// Of a commanded tip motion.
@@ -155,6 +170,7 @@ impl Default for Noise {
             pixels: 0.5,
             joints: 0.0,
             pose: PoseNoise::default(),
+            target: None,
             joint_action: 0.0,
             pose_action: PoseNoise::default(),
         }

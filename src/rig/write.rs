@@ -8,7 +8,7 @@ use super::replace::replace_file;
 use super::{Estimate, Fit, Joint, Rig, Robot};
 use crate::Error;
 use lists::{set_texts, write_list};
-use parts::{write_camera, write_feature, write_joint, write_noise};
+use parts::{write_camera, write_feature, write_joint, write_noise, write_target};
 use std::path::Path;
 use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
 use values::{Writer, number, numbers, set};
@@ -88,6 +88,15 @@ fn write_rig(document: &mut DocumentMut, before: Option<&Rig>, now: &Rig) {
     });
     if is_new {
         append_list(document, "features", "");
+    }
+    let names: Vec<&str> = now.targets.iter().map(|target| target.name.as_str()).collect();
+    let is_new = write_list(document.as_table_mut(), "targets", &names, |table, index, existed| {
+        let target = &now.targets[index];
+        let old = before.targets.iter().find(|old| existed && old.name == target.name);
+        write_target(table, old.map(|old| (old, joints.0)), (target, joints.1));
+    });
+    if is_new {
+        append_list(document, "targets", "");
     }
     if fresh || before.noise != now.noise {
         let old = (!fresh).then_some(&before.noise);

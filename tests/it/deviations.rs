@@ -38,6 +38,7 @@ fn differences(parameter: &Parameter, learned: &Rig, truth: &Rig) -> Vec<f64> {
             };
             vec![value(learned) - value(truth)]
         }
+        Parameter::TargetPose(target) => pose(learned.targets[target].pose, truth.targets[target].pose),
         Parameter::FeatureXyz(feature) => {
             let [learned, truth] = [learned, truth].map(|rig| rig.features[feature].xyz.unwrap());
             learned.iter().zip(truth).map(|(learned, truth)| learned - truth).collect()

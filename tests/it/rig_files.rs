@@ -84,11 +84,19 @@ fn random_rig(seed: u64) -> Rig {
             xyz: maybe(random, |r| std::array::from_fn(|_| random_number(r))),
         });
     }
+    for index in 0..random.random_range(0..3) {
+        rig.targets.push(Target {
+            name: format!("tag {index}"),
+            parent: parent(random),
+            pose: maybe(random, random_pose),
+        });
+    }
     if random.random_bool(0.7) {
         rig.noise = Noise {
             pixels: random.random_range(0.0..2.0),
             joints: random.random_range(0.0..1e-6),
             pose: PoseNoise { xyz: random.random_range(0.0..0.1), rot: 0.0 },
+            target: maybe(random, |r| PoseNoise { xyz: r.random_range(1e-6..0.1), rot: r.random_range(1e-6..0.1) }),
             joint_action: 0.0,
             pose_action: PoseNoise { xyz: 0.0, rot: random.random_range(0.0..0.1) },
         };
@@ -133,7 +141,9 @@ fn assert_same(found: &Rig, expected: &Rig, what: &str) {
 }
 
 fn poses(rig: &mut Rig) -> Vec<&mut Option<Pose>> {
-    std::iter::once(&mut rig.robot.base).chain(rig.cameras.iter_mut().map(|camera| &mut camera.pose)).collect()
+    let cameras = rig.cameras.iter_mut().map(|camera| &mut camera.pose);
+    let targets = rig.targets.iter_mut().map(|target| &mut target.pose);
+    std::iter::once(&mut rig.robot.base).chain(cameras).chain(targets).collect()
 }
 
 #[test]

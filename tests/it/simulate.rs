@@ -39,6 +39,7 @@ fn noise_has_the_standard_deviations_of_the_rig() {
         pixels: 0.7,
         joints: 0.002,
         pose: PoseNoise { xyz: 0.003, rot: 0.004 },
+        target: None,
         joint_action: 0.005,
         pose_action: PoseNoise { xyz: 0.006, rot: 0.007 },
     };

@@ -2,7 +2,7 @@
 use crate::learning::{learn, nothing};
 use handeye::calibrate::{Finding, Options, calibrate, evaluate};
 use handeye::recording::{Recording, Sample};
-use handeye::rig::{Noise, PoseNoise, Rig};
+use handeye::rig::{Camera, Noise, PoseNoise, Rig};
 use handeye::simulate::{SimulateOptions, Simulation, random_rig, simulate};
 use handeye::solvers::Pose;
 use std::ops::ControlFlow;
@@ -223,4 +223,27 @@ fn noise_of_actions_is_estimated_where_nothing_else_is_known() {
     let state = |noise: &mut Noise| noise.pose_action = PoseNoise { xyz: 0.004, rot: 0.008 };
     let poses = ratios(60, state, forget, &[|n| n.pixels, |n| n.pose_action.xyz, |n| n.pose_action.rot]);
     assert_unbiased(&poses, 0.07);
+}
+
+// Sums of 100 squares of normalised errors: χ² with 100 degrees of freedom is between these bounds in 998 of 1,000 cases.
+#[test]
+fn standard_deviations_cover_the_truth_where_the_noise_of_joints_is_known() {
+    let values = |camera: &Camera| [camera.fx, camera.fy, camera.cx, camera.cy].map(|value| value.expect("known"));
+    let mut squares = [0.0; 8];
+    for seed in 1..=100 {
+        let truth = noisy(seed, |noise| noise.joints = 0.02);
+        let mut rig = nothing(&truth);
+        // The header holds the true values, around which a prior would make the errors too small.
+        rig.estimate.prior.insert("cameras".to_owned(), 1e4);
+        rig.cameras = truth.cameras.iter().map(|camera| Camera { pose: None, ..camera.clone() }).collect();
+        let learned = learn(&rig, &record(&truth, 50, seed).recording).expect("enough data").rig;
+        let sd = &learned.fit.as_ref().expect("learned").sd;
+        for (index, (learned, truth)) in learned.cameras.iter().zip(&truth.cameras).enumerate() {
+            let errors = values(learned).into_iter().zip(values(truth)).map(|(learned, truth)| learned - truth);
+            for (place, (field, error)) in ["fx", "fy", "cx", "cy"].into_iter().zip(errors).enumerate() {
+                squares[4 * index + place] += (error / sd[&format!("cameras.{}.{field}", truth.name)][0]).powi(2);
+            }
+        }
+    }
+    assert!(squares.iter().all(|sum| (61.9..149.5).contains(sum)), "{squares:.1?}");
 }

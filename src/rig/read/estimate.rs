@@ -74,15 +74,17 @@ pub(super) fn problem_of_pattern(pattern: &str, rig: &Rig) -> Option<String> {
     let joints: Vec<&str> = rig.robot.joints.iter().map(|joint| joint.name.as_str()).collect();
     let cameras: Vec<&str> = rig.cameras.iter().map(|camera| camera.name.as_str()).collect();
     let features: Vec<&str> = rig.features.iter().map(|feature| feature.name.as_str()).collect();
+    let targets: Vec<&str> = rig.targets.iter().map(|target| target.name.as_str()).collect();
     let joint_fields: Vec<&str> = JointField::ALL.iter().map(|field| field.name()).collect();
     let camera_fields: Vec<&str> =
         std::iter::once("pose").chain(CameraField::ALL.iter().map(|field| field.name())).collect();
     // What may stand at each place of a path, for each kind of parameter; an empty list is any name.
-    let grammar: [&[&[&str]]; 4] = [
+    let grammar: [&[&[&str]]; 5] = [
         &[&["robot"], &["base"]],
         &[&["robot"], &["joints"], &joints, &joint_fields],
         &[&["cameras"], &cameras, &camera_fields],
         &[&["features"], &features, &["xyz"]],
+        &[&["targets"], &targets, &["pose"]],
     ];
     let fits =
         |found: &str, known: &[&str]| found == "*" || known.contains(&found) || (known.is_empty() && !found.is_empty());

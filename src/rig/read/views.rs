@@ -1,4 +1,4 @@
-//! The tables `[[cameras]]` and `[[features]]`: what sees, and what is seen.
+//! The tables `[[cameras]]`, `[[features]]` and `[[targets]]`: what sees, and what is seen.
 use super::document::{Fields, Node};
 use super::named::read_named;
 use super::pose::read_pose;
@@ -6,10 +6,11 @@ use crate::Error;
 use crate::camera::CameraModel;
 use crate::error::suggestion;
 use crate::rig::names::problem_of_name;
-use crate::rig::{Camera, Feature, Joint, Parent};
+use crate::rig::{Camera, Feature, Joint, Parent, Target};
 
 const CAMERA_KEYS: &[&str] = &["name", "size", "model", "fx", "fy", "cx", "cy", "distortion", "parent", "pose"];
 const FEATURE_KEYS: &[&str] = &["name", "parent", "xyz"];
+const TARGET_KEYS: &[&str] = &["name", "parent", "pose"];
 
 pub(super) fn read_cameras(list: Option<Node>, joints: &[Joint]) -> Result<Vec<Camera>, Error> {
     let named = read_named(list.as_ref(), "camera", CAMERA_KEYS, problem_of_name)?;
@@ -41,6 +42,17 @@ pub(super) fn read_features(list: Option<Node>, joints: &[Joint]) -> Result<Vec<
         })
     };
     read_named(list.as_ref(), "feature", FEATURE_KEYS, problem_of_name)?.into_iter().map(read).collect()
+}
+
+pub(super) fn read_targets(list: Option<Node>, joints: &[Joint]) -> Result<Vec<Target>, Error> {
+    let read = |(name, fields): (String, Fields)| -> Result<Target, Error> {
+        Ok(Target {
+            name,
+            parent: fields.optional("parent", |node| read_parent(node, joints))?.unwrap_or(Parent::World),
+            pose: fields.optional("pose", read_pose)?,
+        })
+    };
+    read_named(list.as_ref(), "target", TARGET_KEYS, problem_of_name)?.into_iter().map(read).collect()
 }
 
 fn read_size(node: &Node) -> Result<[u32; 2], Error> {

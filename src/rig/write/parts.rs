@@ -1,6 +1,6 @@
-//! The parts of a rig as tables: joints, cameras, features, noise.
+//! The parts of a rig as tables: joints, cameras, features, targets, noise.
 use super::values::{Writer, number, numbers, set};
-use crate::rig::{Camera, Feature, Joint, Limits, Noise, Parent, PoseNoise};
+use crate::rig::{Camera, Feature, Joint, Limits, Noise, Parent, PoseNoise, Target};
 use toml_edit::{Array, InlineTable, Item, TableLike, Value};
 
 pub(super) fn write_joint(table: &mut dyn TableLike, before: Option<&Joint>, now: &Joint) {
@@ -74,6 +74,19 @@ pub(super) fn write_feature(
     writer.put("xyz", &before.and_then(|(before, _)| before.xyz), &now.xyz, |v| numbers(v));
 }
 
+pub(super) fn write_target(
+    table: &mut dyn TableLike,
+    before: Option<(&Target, &[Joint])>,
+    (now, joints): (&Target, &[Joint]),
+) {
+    let blank = Target::default();
+    let mut writer = Writer { table, fresh: before.is_none() };
+    let (before, joints_before) = before.unwrap_or((&blank, &[]));
+    writer.put_default("name", &before.name, &now.name, |name| Value::from(name.as_str()));
+    write_parent(&mut writer, parent(before.parent, joints_before), parent(now.parent, joints));
+    writer.put_pose("pose", &before.pose, &now.pose);
+}
+
 fn write_parent(writer: &mut Writer, before: &str, now: &str) {
     writer.put_default("parent", before, now, |name| Value::from(*name));
 }
@@ -93,6 +106,11 @@ pub(super) fn write_noise(table: &mut dyn TableLike, before: Option<&Noise>, now
     writer.put_default("pixels", before.pixels, now.pixels, |v| number(*v));
     writer.put_default("joints", before.joints, now.joints, |v| number(*v));
     write_pose_noise(&mut writer, "pose", before.pose, now.pose);
+    match (before.target, now.target) {
+        (before, Some(now)) => write_pose_noise(&mut writer, "target", before.unwrap_or_default(), now),
+        (Some(_), None) => drop(writer.table.remove("target")),
+        (None, None) => {}
+    }
     writer.put_default("joint_action", before.joint_action, now.joint_action, |v| number(*v));
     write_pose_noise(&mut writer, "pose_action", before.pose_action, now.pose_action);
 }

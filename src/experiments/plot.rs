@@ -1,0 +1,138 @@
+//! The curves of an experiment as an SVG drawing: ours in the median with what lies between 10 and 90 %, published ones dashed.
+use super::{Outcome, Row};
+use std::fmt::Write;
+
+const WIDTH: f64 = 720.0;
+const HEIGHT: f64 = 440.0;
+/// Margins: left, right, top, bottom.
+const MARGIN: [f64; 4] = [70.0, 20.0, 44.0, 56.0];
+const COLOURS: [&str; 4] = ["#1f77b4", "#d62728", "#2ca02c", "#9467bd"];
+
+/// The rows that have a place along the abscissa, on a logarithmic ordinate; `None` where there are none.
+pub fn svg(title: &str, outcome: &Outcome) -> Option<String> {
+    let rows: Vec<&Row> = outcome.rows.iter().filter(|row| row.x.is_some() && !row.values.is_empty()).collect();
+    let axes = Axes::new(&rows)?;
+    let mut svg = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" font-family=\"sans-serif\" \
+         font-size=\"13\">\n<rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"white\"/>\n"
+    );
+    text(&mut svg, [WIDTH / 2.0, 20.0], "middle", title);
+    text(&mut svg, [WIDTH / 2.0, HEIGHT - 12.0], "middle", outcome.abscissa.unwrap_or_default());
+    let _ = writeln!(
+        svg,
+        "<text transform=\"translate(16 {}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
+        HEIGHT / 2.0,
+        escaped(outcome.measure)
+    );
+    axes.draw(&mut svg);
+    let mut series: Vec<&str> = rows.iter().map(|row| row.series).collect();
+    series.dedup();
+    for (index, name) in series.iter().enumerate() {
+        let colour = COLOURS[index % COLOURS.len()];
+        let own: Vec<&Row> = rows.iter().copied().filter(|row| row.series == *name).collect();
+        curve(&mut svg, &axes, &own, colour);
+        let y = MARGIN[2] + 16.0 * (index as f64 + 1.0);
+        let label = if name.is_empty() { "ours" } else { name };
+        let _ = writeln!(svg, "<circle cx=\"{}\" cy=\"{}\" r=\"4\" fill=\"{colour}\"/>", WIDTH - 180.0, y - 4.0);
+        text(&mut svg, [WIDTH - 170.0, y], "start", label);
+    }
+    if rows.iter().any(|row| row.published.is_some()) {
+        text(&mut svg, [WIDTH - 184.0, MARGIN[2] + 16.0 * (series.len() as f64 + 1.0)], "start", "- - published");
+    }
+    svg += "</svg>\n";
+    Some(svg)
+}
+
+/// Ours: the band, the line where every point is of several trials, and the points. Published: a dashed line.
+fn curve(svg: &mut String, axes: &Axes, rows: &[&Row], colour: &str) {
+    let at = |row: &Row, y: f64| axes.place(row.x.unwrap_or_default(), y);
+    let share = |row: &Row, share: f64| {
+        let mut sorted = row.values.clone();
+        sorted.sort_by(f64::total_cmp);
+        sorted[((sorted.len() - 1) as f64 * share).round() as usize]
+    };
+    let medians: Vec<[f64; 2]> = rows.iter().map(|row| at(row, row.median().unwrap_or_default())).collect();
+    if rows.iter().any(|row| row.values.len() > 1) {
+        let upper = rows.iter().map(|row| at(row, share(row, 0.9)));
+        let lower = rows.iter().rev().map(|row| at(row, share(row, 0.1)));
+        let band = points(upper.chain(lower));
+        let _ = writeln!(svg, "<polygon points=\"{band}\" fill=\"{colour}\" fill-opacity=\"0.15\"/>");
+        let line = points(medians.iter().copied());
+        let _ = writeln!(svg, "<polyline points=\"{line}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>");
+    }
+    for [x, y] in medians {
+        let _ = writeln!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3.5\" fill=\"{colour}\"/>");
+    }
+    let published = rows.iter().filter_map(|row| Some(at(row, row.published?.mean)));
+    let line = points(published);
+    if !line.is_empty() {
+        let _ =
+            writeln!(svg, "<polyline points=\"{line}\" fill=\"none\" stroke=\"{colour}\" stroke-dasharray=\"6 5\"/>");
+    }
+}
+
+/// From values to places in the drawing.
+struct Axes {
+    x: [f64; 2],
+    /// Powers of ten.
+    y: [f64; 2],
+}
+
+impl Axes {
+    fn new(rows: &[&Row]) -> Option<Axes> {
+        let range = |values: &mut dyn Iterator<Item = f64>| {
+            values.fold(None, |range: Option<[f64; 2]>, value| {
+                Some(range.map_or([value; 2], |[least, most]| [least.min(value), most.max(value)]))
+            })
+        };
+        let [x0, x1] = range(&mut rows.iter().filter_map(|row| row.x))?;
+        let figures = rows.iter().flat_map(|row| row.values.iter().copied().chain(row.published.map(|p| p.mean)));
+        let [y0, y1] = range(&mut figures.filter(|value| *value > 0.0 && value.is_finite()))?;
+        let pad = 0.03 * (x1 - x0).max(1e-6 * x1.abs()).max(1e-12);
+        let (low, high) = (y0.log10().floor(), y1.log10().ceil());
+        Some(Axes { x: [x0 - pad, x1 + pad], y: [low, high.max(low + 1.0)] })
+    }
+
+    /// Where a value stands [px of the drawing].
+    fn place(&self, x: f64, y: f64) -> [f64; 2] {
+        let along = (x - self.x[0]) / (self.x[1] - self.x[0]);
+        let up = (y.max(f64::MIN_POSITIVE).log10() - self.y[0]) / (self.y[1] - self.y[0]);
+        [
+            MARGIN[0] + along * (WIDTH - MARGIN[0] - MARGIN[1]),
+            HEIGHT - MARGIN[3] - up.clamp(0.0, 1.0) * (HEIGHT - MARGIN[2] - MARGIN[3]),
+        ]
+    }
+
+    /// A line per power of ten, five numbers along the abscissa.
+    fn draw(&self, svg: &mut String) {
+        for power in self.y[0] as i32..=self.y[1] as i32 {
+            let value = 10.0_f64.powi(power);
+            let [left, y] = self.place(self.x[0], value);
+            let _ = writeln!(
+                svg,
+                "<line x1=\"{left:.1}\" y1=\"{y:.1}\" x2=\"{:.1}\" y2=\"{y:.1}\" stroke=\"#ddd\"/>",
+                WIDTH - MARGIN[1]
+            );
+            text(svg, [left - 6.0, y + 4.0], "end", &format!("{value}"));
+        }
+        for tick in 0..5 {
+            let value = self.x[0] + (self.x[1] - self.x[0]) * (0.03 / 1.06 + f64::from(tick) / 4.0 / 1.06);
+            let [x, _] = self.place(value, 1.0);
+            let span = self.x[1] - self.x[0];
+            let digits = if span > 5.0 { 0 } else { (1.0 - span.log10()).ceil().max(0.0) as usize };
+            text(svg, [x, HEIGHT - MARGIN[3] + 18.0], "middle", &format!("{value:.digits$}"));
+        }
+    }
+}
+
+fn points(places: impl Iterator<Item = [f64; 2]>) -> String {
+    places.map(|[x, y]| format!("{x:.1},{y:.1}")).collect::<Vec<_>>().join(" ")
+}
+
+fn text(svg: &mut String, [x, y]: [f64; 2], anchor: &str, words: &str) {
+    let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{}</text>", escaped(words));
+}
+
+fn escaped(words: &str) -> String {
+    words.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}

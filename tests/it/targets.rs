@@ -1,0 +1,209 @@
+//! Cameras and targets are learned from poses of targets, with the images' clock and the scale, and what is open is said.
+use handeye::calibrate::{Calibration, Options, calibrate};
+use handeye::recording::{RecordedCamera, Recording, Sample, TargetDetection};
+use handeye::rig::{Camera, Parent, PoseNoise, Rig};
+use handeye::solvers::Pose;
+use nalgebra::Vector3;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::ops::ControlFlow;
+
+/// What is true of a simulated recording.
+struct World {
+    camera: Pose,
+    target: Pose,
+    on_hand: bool,
+}
+
+/// How a recording is spoilt.
+#[derive(Clone, Copy, Default)]
+struct Spoilt {
+    robot: PoseNoise,
+    target: PoseNoise,
+    scale: Option<f64>,
+    /// Share of detections that are anything.
+    wrong: f64,
+}
+
+fn noise(random: &mut ChaCha8Rng, noise: PoseNoise) -> Pose {
+    let mut vector = |sd: f64| Vector3::from_fn(|_, _| sd * Distribution::<f64>::sample(&StandardNormal, random));
+    Pose::new(vector(noise.rot), vector(noise.xyz))
+}
+
+fn pose(random: &mut ChaCha8Rng, turn: f64, length: f64) -> Pose {
+    let mut vector = |size: f64| Vector3::from_fn(|_, _| random.random_range(-size..size));
+    Pose::new(vector(turn), vector(length))
+}
+
+fn world(random: &mut ChaCha8Rng, on_hand: bool) -> World {
+    let (near, far) = (pose(random, 1.0, 0.1), pose(random, 1.5, 1.0));
+    if on_hand { World { camera: near, target: far, on_hand } } else { World { camera: far, target: near, on_hand } }
+}
+
+impl World {
+    fn seen(&self, tip: &Pose) -> Pose {
+        let (mount, carrier) = if self.on_hand { (*tip, Pose::identity()) } else { (Pose::identity(), *tip) };
+        (mount * self.camera).inverse() * carrier * self.target
+    }
+
+    fn sample(&self, random: &mut ChaCha8Rng, tip: Pose, spoilt: Spoilt) -> Sample {
+        let mut seen = self.seen(&tip);
+        if random.random_bool(spoilt.wrong) {
+            seen = pose(random, 2.0, 1.0);
+        }
+        seen.translation *= spoilt.scale.unwrap_or(1.0);
+        let error = noise(random, spoilt.target);
+        let seen = Pose { rotation: seen.rotation * error.rotation, translation: seen.translation + error.translation };
+        let targets = vec![TargetDetection { camera: 0, target: "tag".into(), pose: seen }];
+        Sample { pose: Some(tip * noise(random, spoilt.robot)), targets, ..Sample::default() }
+    }
+
+    fn rig(&self) -> Rig {
+        let parent = if self.on_hand { Parent::Tip } else { Parent::World };
+        Rig { cameras: vec![Camera { name: "camera".into(), parent, ..Camera::default() }], ..Rig::default() }
+    }
+}
+
+fn recording(samples: Vec<Sample>) -> Recording {
+    let camera = RecordedCamera { name: "camera".into(), ..RecordedCamera::default() };
+    Recording { cameras: vec![camera], samples, ..Recording::default() }
+}
+
+fn learn(rig: &Rig, recording: &Recording) -> Calibration {
+    calibrate(rig, recording, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap()
+}
+
+/// Errors of camera and target [rad, m].
+fn errors(learned: &Rig, world: &World) -> [f64; 4] {
+    let (camera, target) = (learned.cameras[0].pose.unwrap(), learned.targets[0].pose.unwrap());
+    let off = |found: &Pose, truth: &Pose| (found.angle_to(truth), (found.translation - truth.translation).norm());
+    let ((a, b), (c, d)) = (off(&camera, &world.camera), off(&target, &world.target));
+    [a, b, c, d]
+}
+
+#[test]
+fn exact_poses_give_the_exact_camera_and_target_on_the_hand_or_in_the_world() {
+    for seed in 0..10 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let world = world(&mut random, seed % 2 == 0);
+        let scale = (seed % 3 == 0).then_some(2.5);
+        let spoilt = Spoilt { scale, ..Spoilt::default() };
+        let samples = (0..8)
+            .map(|_| {
+                let tip = pose(&mut random, 1.0, 0.5);
+                world.sample(&mut random, tip, spoilt)
+            })
+            .collect();
+        let learned = learn(&world.rig(), &recording(samples));
+        let errors = errors(&learned.rig, &world);
+        assert!(errors.iter().all(|error| *error < 1e-5), "seed {seed}: {errors:?}");
+        let report = learned.report.targets.unwrap();
+        assert_eq!(report.scale.is_some(), scale.is_some(), "seed {seed}");
+        assert!(learned.report.gauge.is_empty() && learned.report.converged);
+        let text = learned.rig.to_toml();
+        assert_eq!(Rig::parse(&text, "learned.toml").unwrap().targets.len(), 1, "a learned rig is a rig file");
+    }
+}
+
+// Normalised squared errors of the camera's six numbers are χ² with 6 degrees of freedom: over 40 seeds the sum has mean 240 and
+// standard deviation 22.
+#[test]
+fn stated_noise_of_robot_and_targets_gives_honest_standard_deviations() {
+    let spoilt = Spoilt {
+        robot: PoseNoise { xyz: 0.001, rot: 0.002 },
+        target: PoseNoise { xyz: 0.002, rot: 0.004 },
+        ..Spoilt::default()
+    };
+    let mut sum = 0.0;
+    for seed in 0..40 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let world = world(&mut random, seed % 2 == 0);
+        let samples = (0..20)
+            .map(|_| {
+                let tip = pose(&mut random, 1.0, 0.3);
+                world.sample(&mut random, tip, spoilt)
+            })
+            .collect();
+        let mut rig = world.rig();
+        (rig.noise.pose, rig.noise.target) = (spoilt.robot, Some(spoilt.target));
+        let learned = learn(&rig, &recording(samples)).rig;
+        let sd = &learned.fit.as_ref().unwrap().sd["cameras.camera.pose"];
+        let (found, truth) = (learned.cameras[0].pose.unwrap(), world.camera);
+        let turn = handeye::solvers::manifold::so3::log(&(found.rotation * truth.rotation.transpose()));
+        let step = (found.translation - truth.translation).iter().chain(turn.iter()).copied().collect::<Vec<_>>();
+        sum += step.iter().zip(sd).map(|(error, sd)| (error / sd).powi(2)).sum::<f64>();
+    }
+    // Coordinates are correlated, which widens the spread of the sum but not its mean.
+    assert!((120.0..400.0).contains(&sum), "{sum}");
+}
+
+#[test]
+fn three_wrong_detections_in_ten_spoil_nothing_and_are_left_out() {
+    for seed in 0..10 {
+        let mut random = ChaCha8Rng::seed_from_u64(100 + seed);
+        let world = world(&mut random, seed % 2 == 0);
+        let target = PoseNoise { xyz: 0.001, rot: 0.002 };
+        let spoilt = Spoilt { target, wrong: 0.3, ..Spoilt::default() };
+        let samples = (0..40)
+            .map(|_| {
+                let tip = pose(&mut random, 1.0, 0.3);
+                world.sample(&mut random, tip, spoilt)
+            })
+            .collect();
+        let learned = learn(&world.rig(), &recording(samples));
+        let errors = errors(&learned.rig, &world);
+        assert!(errors.iter().all(|error| *error < 0.005), "seed {seed}: {errors:?}");
+        assert!(learned.report.rejected >= 3, "seed {seed}: {}", learned.report.rejected);
+    }
+}
+
+#[test]
+fn turns_about_one_axis_are_reported_with_that_axis() {
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    let world = world(&mut random, true);
+    let axis = Vector3::new(0.6, 0.0, 0.8);
+    let target = PoseNoise { xyz: 0.001, rot: 0.001 };
+    let samples = (0..20).map(|k| {
+        let tip = Pose::new(axis * (0.1 * f64::from(k)), pose(&mut random, 1.0, 0.3).translation);
+        world.sample(&mut random, tip, Spoilt { target, ..Spoilt::default() })
+    });
+    let samples = samples.collect();
+    let gauge = learn(&world.rig(), &recording(samples)).report.gauge;
+    assert!(
+        gauge.iter().any(|line| line.contains("one axis") && line.contains("0.600") && line.contains("0.800")),
+        "{gauge:?}"
+    );
+}
+
+#[test]
+fn a_clock_that_is_ahead_is_found_where_robot_and_images_were_recorded_apart() {
+    for seed in 0..4 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let world = world(&mut random, seed % 2 == 0);
+        let target = PoseNoise { xyz: 0.001, rot: 0.002 };
+        let ahead = 0.04 * (seed as f64 - 1.5);
+        let tip = |t: f64| {
+            let wave = |f: f64, p: f64| (std::f64::consts::TAU * f * t + p).sin();
+            let turn = Vector3::new(0.5 * wave(0.31, 0.0), 0.4 * wave(0.43, 1.0), 0.6 * wave(0.23, 2.0));
+            Pose::new(turn, Vector3::new(0.2 * wave(0.27, 0.5), 0.2 * wave(0.37, 1.5), 0.1 * wave(0.53, 2.5)))
+        };
+        let mut samples: Vec<Sample> = Vec::new();
+        for k in 0..1000 {
+            let time = 0.008 * f64::from(k);
+            let pose = tip(time) * noise(&mut random, PoseNoise { xyz: 0.0003, rot: 0.0005 });
+            samples.push(Sample { time: Some(time), pose: Some(pose), ..Sample::default() });
+        }
+        for k in 0..220 {
+            let time = 0.3 + 0.033 * f64::from(k);
+            let image = world.sample(&mut random, tip(time), Spoilt { target, ..Spoilt::default() });
+            samples.push(Sample { time: Some(time + ahead), pose: None, ..image });
+        }
+        samples.sort_by(|a, b| a.time.partial_cmp(&b.time).unwrap());
+        let learned = learn(&world.rig(), &recording(samples));
+        let (offset, sd) = learned.report.targets.as_ref().unwrap().time_offset.unwrap();
+        assert!((offset - ahead).abs() < 5.0 * sd && sd < 1e-3, "seed {seed}: {offset} ± {sd}, true {ahead}");
+        let errors = errors(&learned.rig, &world);
+        assert!(errors.iter().all(|error| *error < 0.003), "seed {seed}: {errors:?}");
+    }
+}
