@@ -1,15 +1,18 @@
 //! How well the learned numbers are determined: standard deviations, the tip's in metres, and what only a prior decides.
+use super::direction::Direction;
 use super::evaluate::median;
 use super::graph::{Built, Freedom, Priors, build, row};
 use super::outliers::{Verdict, distances};
 use super::setup::Setup;
 use super::stage::{Stage, Stages};
-use super::weak::{self, Combination};
-use super::{TipDeviation, gauge};
+use super::weak::Combination;
+use super::{TipDeviation, gauge, poorly, variances};
 use crate::calibrate::graph::State;
+use crate::factors::ForwardKinematics;
 use crate::rig::{CameraField, JointField, Parameter};
-use handeye_solvers::{Covariance, Loss, Solver, WeakDirection};
+use handeye_solvers::{Covariance, DynamicVector, Key, Loss, Pose, Solver, WeakDirection};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Standard deviations of what was learned.
 #[derive(Clone, Debug, Default)]
@@ -47,8 +50,9 @@ impl<'a> Honest<'a> {
             let w = 1.0 / (1.0 + s / (width * width));
             (pulls, slopes, n) = (pulls + w * w * s, slopes + w * w, n + 1.0);
         }
-        let free = free_count(last.freedom) as f64;
-        let left = if 2.0 * n > free { 2.0 * n / (2.0 * n - free) } else { 1.0 };
+        // Where something is open, nothing is said of deviations.
+        let redundancy = variances::redundancy_of_pixels(stages, last, state, verdict).unwrap_or(2.0 * n);
+        let left = if redundancy >= 1.0 { 2.0 * n / redundancy } else { 1.0 };
         let ratio = if n > 0.0 { left * 0.5 * pulls * n / (slopes * slopes) } else { 1.0 };
         let mut setup = stages.setup.clone();
         setup.rig.noise.pixels = sigma * ratio.max(1.0).sqrt();
@@ -58,15 +62,6 @@ impl<'a> Honest<'a> {
     fn build(&self, freedom: &Freedom, state: &State, verdict: &Verdict) -> Built {
         build(&self.setup, state, freedom, self.priors, self.loss, |index| verdict.active[index])
     }
-}
-
-/// How many numbers of the rig are free.
-fn free_count(freedom: &Freedom) -> usize {
-    let held = [&freedom.base[..], &freedom.parameters].into_iter();
-    let held = held.chain(freedom.cameras.iter().map(|held| &held[..]));
-    let held = held.chain(freedom.intrinsics.iter().map(|held| &held[..]));
-    let held = held.chain(freedom.features.iter().map(|held| &held[..]));
-    held.flatten().filter(|held| !**held).count()
 }
 
 /// Root of the mean square of a coordinate's error over the stated noise.
@@ -82,10 +77,13 @@ pub(crate) fn deviations(honest: &Honest<'_>, freedom: &Freedom, state: &State, 
     let built = honest.build(freedom, state, verdict);
     let mut solver = Solver::new(&built.graph);
     if let Ok(found) = WeakDirection::find(&built.graph, &mut solver, Some(&built.states())) {
-        deviations.weak = found.iter().map(|weak| Combination::new(honest, state, &built, weak)).collect();
+        deviations.weak = Combination::all(honest, state, &built, &found);
     }
     if let Ok(mut covariance) = Covariance::with(&built.graph, solver) {
         deviations.by_path = by_path(&honest.setup, freedom, &built, &mut covariance);
+        if deviations.weak.is_empty() {
+            deviations.weak.extend(poorly::determined(honest, state, freedom, &built, &mut covariance));
+        }
         deviations.tip = tip(honest, freedom, state, verdict);
     }
     deviations
@@ -94,22 +92,24 @@ pub(crate) fn deviations(honest: &Honest<'_>, freedom: &Freedom, state: &State, 
 /// Deviation of the tip's position, root of the trace of its covariance, over the samples.
 ///
 /// The base and the tip's frame are taken as they are: where only a prior says how the base lies against the first axis, or
-/// the tip's frame against the features, nothing that is seen depends on it.
+/// the tip's frame against the features, nothing that is seen depends on it. Joints are taken as they are too: how well those
+/// of a sample were read is no matter of the rig. `None` also where the tip does not follow from anything that is learned.
 fn tip(honest: &Honest<'_>, freedom: &Freedom, state: &State, verdict: &Verdict) -> Option<TipDeviation> {
     let freedom = gauge::with_frames_held(&honest.setup, freedom);
-    let built = honest.build(&freedom, state, verdict);
+    if !gauge::is_tip_learned(&honest.setup, &freedom) {
+        return None;
+    }
+    let mut built = honest.build(&freedom, state, verdict);
+    let (samples, tips) = tips_at_held_joints(&mut built, state);
     let mut solver = Solver::new(&built.graph);
     let weak = WeakDirection::find(&built.graph, &mut solver, Some(&built.states())).ok()?;
     let mut covariance = Covariance::with(&built.graph, solver).ok()?;
-    let tips: Vec<(usize, _)> = built.tips.iter().enumerate().filter_map(|(s, tip)| Some((s, (*tip)?))).collect();
-    let every = tips.len().div_ceil(TIPS).max(1);
-    let chosen: Vec<(usize, _)> = tips.into_iter().step_by(every).collect();
-    let samples: Vec<usize> = chosen.iter().map(|(sample, _)| *sample).collect();
     // Directions found are uncorrelated, so that their shares of a variance add up.
+    let direction = |weak| Direction::of_weak(honest, &built, weak);
     let shares: Vec<Vec<f64>> =
-        weak.iter().filter_map(|weak| weak::tip_motion(honest, state, &built, weak, &samples)).collect();
+        weak.iter().filter_map(|weak| direction(weak).tip_motion(honest, state, &built, &samples)).collect();
     let (mut sds, mut by_data) = (Vec::new(), Vec::new());
-    for (index, &(_, tip)) in chosen.iter().enumerate() {
+    for (index, &tip) in tips.iter().enumerate() {
         let block = covariance.of(tip);
         let variance = (block[(3, 3)] + block[(4, 4)] + block[(5, 5)]).max(0.0);
         let of_priors: f64 = shares.iter().map(|share| share[index].powi(2)).sum();
@@ -123,6 +123,22 @@ fn tip(honest: &Honest<'_>, freedom: &Freedom, state: &State, verdict: &Verdict)
         by_data: median(&mut by_data),
         metric: gauge::length_is_known(&honest.setup),
     })
+}
+
+/// Derived tips of samples, spread evenly over the recording, and which samples these are.
+fn tips_at_held_joints(built: &mut Built, state: &State) -> (Vec<usize>, Vec<Key<Pose>>) {
+    let in_use = |&sample: &usize| state.placed[sample] && built.joints[sample].is_some();
+    let samples: Vec<usize> = (0..state.joints.len()).filter(in_use).collect();
+    let every = samples.len().div_ceil(TIPS).max(1);
+    let samples: Vec<usize> = samples.into_iter().step_by(every).collect();
+    let chain = Arc::new(state.model.chain.clone());
+    let tips = samples.iter().map(|&sample| {
+        let joints = built.graph.held(DynamicVector::from_column_slice(&state.joints[sample]));
+        let tip = ForwardKinematics { chain: chain.clone(), upto: chain.len() };
+        built.graph.derive(tip, (built.base, built.parameters, joints))
+    });
+    let tips = tips.collect();
+    (samples, tips)
 }
 
 /// Standard deviations of everything that is free; poses as translation, then rotation vector.

@@ -1,8 +1,8 @@
 //! How much the result hangs on every sample.
-use super::deviations::Honest;
 use super::gauge;
-use super::graph::{Freedom, State, build};
+use super::graph::{State, build};
 use super::outliers::{Verdict, distances};
+use super::stage::{Stage, Stages};
 use handeye_solvers::{GaussNewton, Solver};
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -13,7 +13,8 @@ pub struct Influence {
     /// Index of the sample in the recording, from 0.
     pub sample: usize,
     /// How far the tip would move: root mean square over the recorded samples, after one Gauss-Newton step [m, or the model's
-    /// unit where nothing metric is known]. `None` where the others do not determine the rig without it.
+    /// unit where nothing metric is known]; infinite where the others do not determine the rig without it. `None` where the
+    /// tip does not follow from anything that is learned.
     pub tip: Option<f64>,
     /// Root mean square pixel distance of its detections [px].
     pub rms_px: f64,
@@ -25,10 +26,11 @@ const TIPS: usize = 100;
 /// Of every sample that has a detection in use, in the order of the recording.
 ///
 /// One step of the same graph without the sample's detections, from where the fit with them ended: the first-order change of
-/// a fit without the sample, its leverage included.
-pub(crate) fn influence(honest: &Honest<'_>, freedom: &Freedom, state: &State, verdict: &Verdict) -> Vec<Influence> {
-    let setup = &honest.setup;
-    let freedom = gauge::with_frames_held(setup, freedom);
+/// a fit without the sample, its leverage included. Detections pull as much as they did in the fit.
+pub(crate) fn influence(stages: &Stages<'_>, last: &Stage<'_>, state: &State, verdict: &Verdict) -> Vec<Influence> {
+    let (setup, priors, loss) = (stages.setup, stages.priors, last.loss);
+    let freedom = gauge::with_frames_held(setup, last.freedom);
+    let is_learned = gauge::is_tip_learned(setup, &freedom);
     let every = setup.len().div_ceil(TIPS).max(1);
     let tips = |state: &State| -> Vec<Vector3<f64>> {
         let tip = |sample: usize| state.links(setup, sample).last().map(|tip| tip.translation);
@@ -43,30 +45,33 @@ pub(crate) fn influence(honest: &Honest<'_>, freedom: &Freedom, state: &State, v
         if squares.is_empty() {
             return None;
         }
+        let rms_px = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        if !is_learned {
+            return Some(Influence { sample: setup.samples[sample], tip: None, rms_px });
+        }
         let takes_part = |index: usize| verdict.active[index] && !(first..end).contains(&index);
-        let mut built = build(setup, state, &freedom, honest.priors, honest.loss, takes_part);
+        let mut built = build(setup, state, &freedom, priors, loss, takes_part);
         let step = GaussNewton { max_iterations: 1, halvings: 0, ..GaussNewton::default() };
         let mut solver = Solver::new(&built.graph);
         let stepped =
             step.minimize_with(&mut built.graph, &mut solver, &mut |_| std::ops::ControlFlow::Continue(())).is_ok();
-        let moved = stepped.then(|| {
-            let mut without = state.clone();
-            built.read(&mut without);
-            // The sample's own state is no longer seen where it is free; the rig decides.
-            without.joints.clone_from(&state.joints);
-            let square: f64 = tips(&without).iter().zip(&before).map(|(a, b)| (a - b).norm_squared()).sum();
-            (square / before.len().max(1) as f64).sqrt()
-        });
-        let rms_px = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
-        Some(Influence { sample: setup.samples[sample], tip: moved.filter(|tip| tip.is_finite()), rms_px })
+        let mut without = state.clone();
+        built.read(&mut without);
+        // The rig is compared, at the same joints.
+        without.joints.clone_from(&state.joints);
+        let square: f64 = tips(&without).iter().zip(&before).map(|(a, b)| (a - b).norm_squared()).sum();
+        let moved = (square / before.len().max(1) as f64).sqrt();
+        let tip = if stepped && moved.is_finite() { moved } else { f64::INFINITY };
+        Some(Influence { sample: setup.samples[sample], tip: Some(tip), rms_px })
     };
     (0..setup.len()).into_par_iter().filter_map(of_sample).collect()
 }
 
-/// The most influential, the largest first.
+/// The most influential, the largest first; none where the tip does not follow from anything that is learned.
 pub fn most_influential(all: &[Influence], count: usize) -> Vec<Influence> {
+    let moving: Vec<Influence> = all.iter().filter(|one| one.tip.is_some()).copied().collect();
     // What nothing can replace is the most influential of all.
-    largest(all, count, |one| one.tip.unwrap_or(f64::INFINITY))
+    largest(&moving, count, |one| one.tip.unwrap_or(0.0))
 }
 
 /// The worst-fitting, the largest error first.

@@ -1,6 +1,8 @@
 //! Learns a rig from a recording.
 mod anchor;
+mod cures;
 mod deviations;
+mod direction;
 pub(crate) mod evaluate;
 mod finish;
 mod gauge;
@@ -12,6 +14,7 @@ mod kinematics;
 mod look;
 mod motion;
 mod outliers;
+mod poorly;
 mod priors;
 mod readings;
 mod report;
@@ -175,8 +178,7 @@ fn attempt(
     };
     let honest = Honest::new(&stages, &last, &state, &verdict);
     let deviations = deviations(&honest, &freedom, &state, &verdict);
-    let influence =
-        if options.influence { influence::influence(&honest, &freedom, &state, &verdict) } else { Vec::new() };
+    let influence = if options.influence { influence::influence(&stages, &last, &state, &verdict) } else { Vec::new() };
     let reports = std::mem::take(&mut stages.reports);
     Ok(Attempt { state, verdict, reports, converged, gauge, deviations, influence, noise })
 }

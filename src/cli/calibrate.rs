@@ -111,9 +111,9 @@ fn on_threads<T: Send>(threads: Option<u16>, work: impl FnOnce() -> Result<T, Er
     pool.map_err(|error| Error::Unusable(format!("--threads {threads}: {error}")))?.install(work)
 }
 
-fn describe(before: &Rig, learned: &Rig, report: &Report, seconds: f64) -> String {
+fn describe(before: &Rig, learned_rig: &Rig, report: &Report, seconds: f64) -> String {
     let (samples, detections) = (count(report.samples, "sample"), count(report.observations, "detection"));
-    let learned = learned_in_words(before, learned);
+    let learned = learned_in_words(before, learned_rig);
     let mut text = format!("{learned} from {samples} with {detections}, in {}\n\n", duration(seconds));
     match &report.targets {
         Some(targets) => text += &targets_in_words(targets, report.rejected),
@@ -124,6 +124,8 @@ fn describe(before: &Rig, learned: &Rig, report: &Report, seconds: f64) -> Strin
     }
     if let Some(tip) = &report.tip {
         text += &format!("\nthe tip's position is known to {}\n", tip_in_words(tip));
+    } else {
+        text += &trust::cameras_in_words(learned_rig);
     }
     for (title, lines) in [
         ("what is known of the robot's state", report.states.clone()),

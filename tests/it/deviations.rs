@@ -11,6 +11,7 @@ use handeye::solvers::manifold::so3;
 use std::collections::BTreeMap;
 
 const SEEDS: u64 = 60;
+const NOISY_SEEDS: u64 = 30;
 
 /// Values of a parameter: of a pose the difference to that of another rig (as a step), of an angle within a half turn of 0.
 fn differences(parameter: &Parameter, learned: &Rig, truth: &Rig) -> Vec<f64> {
@@ -213,4 +214,45 @@ fn where_the_noise_is_larger_than_stated() {
     let (mean, error) = mean_of(&(0..SEEDS).map(run).collect::<Vec<_>>());
     println!("noise three times as large: mean square {mean:.3} ± {error:.3}");
     assert!((1.0 - 3.0 * error..1.0 + 3.0 * error).contains(&mean), "mean square {mean:.3} ± {error:.3}");
+}
+
+/// The same where joints are read with noise: what is said is the rig's deviation at given joints, not that of the states.
+#[test]
+fn of_the_tip_where_joints_are_noisy() {
+    let mut truth = random_rig(6, 2, 12, 3);
+    truth.noise.joints = 0.01;
+    let mut start = truth.clone();
+    start.estimate.fixed =
+        ["robot.base", "cameras.*.pose", "robot.joints.j1.offset", "robot.joints.j1.d", "robot.joints.j6"]
+            .map(str::to_owned)
+            .into();
+    start.estimate.prior = [("robot", 10.0), ("features", 10.0)].map(|(path, sd)| (path.to_owned(), sd)).into();
+    let exact = simulate(&truth, &SimulateOptions { samples: 40, ..SimulateOptions::default() }).unwrap().truth;
+    let tips = |rig: &Rig| -> Vec<_> {
+        let model = Model::new(rig).unwrap();
+        let joints = exact.samples.iter().flat_map(|sample| &sample.joints);
+        joints.map(|joints| model.tip(joints).translation).collect()
+    };
+    let true_tips = tips(&truth);
+    let (mut squares, mut medians) = (vec![0.0; true_tips.len()], Vec::new());
+    for seed in 0..NOISY_SEEDS {
+        let mut normal = Normal::new(seed);
+        let mut recording = exact.clone();
+        for sample in &mut recording.samples {
+            sample.joints.iter_mut().flatten().for_each(|joint| *joint += normal.draw(truth.noise.joints));
+            for detection in &mut sample.pixels {
+                detection.pixel = detection.pixel.map(|x| x + normal.draw(truth.noise.pixels));
+            }
+        }
+        let learned = learn(&start, &recording).unwrap();
+        medians.push(learned.report.tip.unwrap().median);
+        for (square, (tip, true_tip)) in squares.iter_mut().zip(tips(&learned.rig).iter().zip(&true_tips)) {
+            *square += (tip - true_tip).norm_squared() / NOISY_SEEDS as f64;
+        }
+    }
+    squares.sort_by(f64::total_cmp);
+    let (actual, (said, _)) = (squares[squares.len() / 2].sqrt(), mean_of(&medians));
+    println!("tip, noisy joints: {:.4} mm, {:.4} mm said", 1e3 * actual, 1e3 * said);
+    let bound = 3.0 / (2.0 * NOISY_SEEDS as f64).sqrt();
+    assert!((actual / said - 1.0).abs() < bound, "{actual:.6} m, {said:.6} m said");
 }

@@ -44,7 +44,7 @@ fn one_step_agrees_with_fitting_again_without_the_sample() {
     ratios.sort_by(f64::total_cmp);
     println!("influence over refit: {:.3} {:.3} {:.3}", ratios[0], ratios[12], ratios[24]);
     // The fit's loss lets the outermost detections pull a little less than the step does.
-    assert!((0.9..1.1).contains(&ratios[12]) && ratios[0] > 0.5 && ratios[24] < 2.0, "{ratios:?}");
+    assert!((0.9..1.1).contains(&ratios[12]) && ratios[0] > 0.8 && ratios[24] < 1.25, "{ratios:?}");
 }
 
 #[test]

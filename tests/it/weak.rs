@@ -29,9 +29,9 @@ fn the_scale_that_only_priors_give_is_told_apart_from_what_the_data_determine() 
 #[test]
 fn a_joint_that_hardly_moved_is_named() {
     let mut truth = random_rig(6, 2, 12, 4);
-    let limits = Limits { lower: Some(0.3), upper: Some(0.3 + 6_f64.to_radians()), ..Limits::default() };
+    let limits = Limits { lower: Some(0.3), upper: Some(0.3 + 1_f64.to_radians()), ..Limits::default() };
     truth.robot.joints[2].limits = limits;
     let report = learn(&given(&truth), &record(&truth, 40, 4)).unwrap().report;
     let words: Vec<String> = report.weak.iter().map(ToString::to_string).collect();
-    assert!(words.iter().any(|words| words.contains("joint `j3` moved only 6 degrees")), "{words:#?}");
+    assert!(words.iter().any(|words| words.contains("joint `j3` moved only")), "{words:#?}");
 }
