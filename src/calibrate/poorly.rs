@@ -49,7 +49,7 @@ pub(crate) fn determined(
         DMatrix::from_fn(lengths.len(), lengths.len(), |i, k| sigma[(lengths[i], lengths[k])]).symmetric_eigen();
     let worst = eigen.eigenvalues.imax();
     let sd = eigen.eigenvalues[worst].max(0.0).sqrt();
-    if !(sd > POOR * distance) {
+    if sd.is_nan() || sd <= POOR * distance {
         return None;
     }
     let mut v = DVector::zeros(numbers.len());

@@ -188,17 +188,15 @@ fn together(report: &Report) -> Errors {
 
 fn tip_in_words(tip: &TipDeviation) -> String {
     let TipDeviation { median, largest, by_data, metric } = *tip;
-    if metric {
-        let of_priors = if by_data < 0.9 * median {
-            format!("; {:.3} mm but for what priors determine more than the data", 1e3 * by_data)
-        } else {
-            String::new()
-        };
+    let [median_mm, largest_mm, by_data_mm] = [median, largest, by_data].map(|length| 1e3 * length);
+    if metric && by_data < 0.9 * median {
         return format!(
-            "{:.3} mm (median standard deviation over the samples; largest {:.3} mm{of_priors})",
-            1e3 * median,
-            1e3 * largest
+            "{by_data_mm:.3} mm by the data (median standard deviation over the samples), and to {median_mm:.3} mm (largest \
+             {largest_mm:.3} mm) with what only priors determine"
         );
+    }
+    if metric {
+        return format!("{median_mm:.3} mm (median standard deviation over the samples; largest {largest_mm:.3} mm)");
     }
     format!(
         "{median:.2e} (median standard deviation over the samples, largest {largest:.2e}; nothing metric is known, so in the model's unit)"
