@@ -11,12 +11,14 @@ mod influence;
 mod initialise;
 mod join;
 mod kinematics;
+mod known;
 mod look;
 mod motion;
 mod outliers;
 mod poorly;
 mod priors;
 mod readings;
+mod relearn;
 mod report;
 mod robust;
 mod selection;
@@ -33,6 +35,7 @@ mod weak;
 
 pub use evaluate::{CameraErrors, Errors, Evaluation, evaluate};
 pub use influence::{Influence, most_influential, worst_fitting};
+pub use relearn::relearn;
 pub use report::{Calibration, Finding, Report, StageReport, TipDeviation};
 pub use selection::{NoiseTrial, select_noise};
 pub use targets::{Disagreement, TargetReport};
@@ -40,7 +43,7 @@ pub use weak::{Combination, DeterminedBy};
 
 use crate::Error;
 use crate::recording::Recording;
-use crate::rig::{Noise, Rig};
+use crate::rig::{Noise, Parameter, Rig};
 use deviations::{Honest, deviations, scatter};
 use finish::finish;
 use graph::{Priors, State};
@@ -211,6 +214,7 @@ const TAILS: f64 = 5.0;
 fn is_complete(setup: &Setup) -> bool {
     let rig = &setup.rig;
     setup.chain_is_known()
+        && (rig.robot.base.is_some() || !gauge::world_is_known(setup) || rig.is_fixed(&Parameter::Base))
         && rig.cameras.iter().all(|camera| camera.pose.is_some())
         && rig.features.iter().all(|feature| feature.xyz.is_some())
 }
