@@ -1,14 +1,18 @@
 //! How well the learned numbers are determined: standard deviations, the tip's in metres, and what only a prior decides.
+use super::direction::Direction;
 use super::evaluate::median;
-use super::graph::{Built, Freedom, row};
+use super::graph::{Built, Freedom, Priors, build, row};
 use super::outliers::{Verdict, distances};
 use super::setup::Setup;
 use super::stage::{Stage, Stages};
-use super::{TipDeviation, gauge};
+use super::weak::Combination;
+use super::{TipDeviation, gauge, poorly, variances};
 use crate::calibrate::graph::State;
+use crate::factors::ForwardKinematics;
 use crate::rig::{CameraField, JointField, Parameter};
-use handeye_solvers::{Covariance, Solver, WeakDirection, Weakness};
+use handeye_solvers::{Covariance, DynamicVector, Key, Loss, Pose, Solver, WeakDirection};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Standard deviations of what was learned.
 #[derive(Clone, Debug, Default)]
@@ -17,34 +21,70 @@ pub(crate) struct Deviations {
     pub by_path: BTreeMap<String, Vec<f64>>,
     /// Over the recorded samples; `None` where the data leave something open.
     pub tip: Option<TipDeviation>,
-    /// Directions that nothing, or only a prior, determines, in words.
-    pub weak: Vec<String>,
+    /// What nothing, or a prior more than the data, determines.
+    pub weak: Vec<Combination>,
 }
 
 /// Samples whose tip is looked at, spread evenly over the recording.
 const TIPS: usize = 200;
 
-/// Weak directions that are put in words, and how many numbers each names.
-const DIRECTIONS: usize = 6;
-const NAMED: usize = 4;
+/// The final problem with the noise that the residuals show, in place of the stated one.
+///
+/// With weights w = 1/(1 + s/k²) of Cauchy's loss at the squared whitened distance s, an M-estimator's covariance is that of
+/// least squares times E[w² s / 2] / E[w²]² (Huber 1981, eq. 6.6; on two coordinates, ∂ψ/∂r is w² on average). Data alone are
+/// rescaled: priors say what they say. Less noise than stated is not believed.
+pub(crate) struct Honest<'a> {
+    pub setup: Setup,
+    pub priors: &'a Priors,
+    pub loss: Loss,
+}
 
-/// Deviations at the final state of a stage, by the linearised problem. Where the residuals are larger than the stated noise
-/// explains, all deviations are larger by that factor.
-pub(crate) fn deviations(stages: &Stages<'_>, last: &Stage<'_>, state: &State, verdict: &Verdict) -> Deviations {
-    let setup = stages.setup;
-    let mut deviations = Deviations::default();
-    let built = stages.build(last, state);
-    let mut solver = Solver::new(&built.graph);
-    if let Ok(found) = WeakDirection::find(&built.graph, &mut solver, None) {
-        deviations.weak = found.iter().take(DIRECTIONS).map(|weak| words(setup, &built, weak)).collect();
-        if found.len() > DIRECTIONS {
-            deviations.weak.push(format!("and {} combinations more like these", found.len() - DIRECTIONS));
+impl<'a> Honest<'a> {
+    pub fn new(stages: &Stages<'a>, last: &Stage<'_>, state: &State, verdict: &Verdict) -> Self {
+        let width = if let Loss::Cauchy(width) = last.loss { width } else { f64::INFINITY };
+        let sigma = stages.setup.sigma();
+        let (mut pulls, mut slopes, mut n) = (0.0, 0.0, 0.0);
+        let distances = distances(stages.setup, state);
+        for distance in distances.iter().zip(&verdict.active).filter(|(_, used)| **used).map(|(distance, _)| distance) {
+            let s = (distance / sigma).powi(2);
+            let w = 1.0 / (1.0 + s / (width * width));
+            (pulls, slopes, n) = (pulls + w * w * s, slopes + w * w, n + 1.0);
         }
+        // Where something is open, nothing is said of deviations.
+        let redundancy = variances::redundancy_of_pixels(stages, last, state, verdict).unwrap_or(2.0 * n);
+        let left = if redundancy >= 1.0 { 2.0 * n / redundancy } else { 1.0 };
+        let ratio = if n > 0.0 { left * 0.5 * pulls * n / (slopes * slopes) } else { 1.0 };
+        let mut setup = stages.setup.clone();
+        setup.rig.noise.pixels = sigma * ratio.max(1.0).sqrt();
+        Honest { setup, priors: stages.priors, loss: Loss::Squared }
     }
-    let factor = scatter(setup, state, verdict).max(1.0);
+
+    fn build(&self, freedom: &Freedom, state: &State, verdict: &Verdict) -> Built {
+        build(&self.setup, state, freedom, self.priors, self.loss, |index| verdict.active[index])
+    }
+}
+
+/// Root of the mean square of a coordinate's error over the stated noise.
+pub(crate) fn scatter(setup: &Setup, state: &State, verdict: &Verdict) -> f64 {
+    let distances = distances(setup, state);
+    let used: Vec<f64> = distances.iter().zip(&verdict.active).filter(|(_, used)| **used).map(|(d, _)| d * d).collect();
+    (used.iter().sum::<f64>() / (2.0 * used.len().max(1) as f64)).sqrt() / setup.sigma()
+}
+
+/// Deviations at the final state of a stage, by the linearised problem.
+pub(crate) fn deviations(honest: &Honest<'_>, freedom: &Freedom, state: &State, verdict: &Verdict) -> Deviations {
+    let mut deviations = Deviations::default();
+    let built = honest.build(freedom, state, verdict);
+    let mut solver = Solver::new(&built.graph);
+    if let Ok(found) = WeakDirection::find(&built.graph, &mut solver, Some(&built.states())) {
+        deviations.weak = Combination::all(honest, state, &built, &found);
+    }
     if let Ok(mut covariance) = Covariance::with(&built.graph, solver) {
-        deviations.by_path = by_path(setup, last.freedom, &built, &mut covariance, factor);
-        deviations.tip = tip(stages, last, state, factor);
+        deviations.by_path = by_path(&honest.setup, freedom, &built, &mut covariance);
+        if deviations.weak.is_empty() {
+            deviations.weak.extend(poorly::determined(honest, state, freedom, &built, &mut covariance));
+        }
+        deviations.tip = tip(honest, freedom, state, verdict);
     }
     deviations
 }
@@ -52,27 +92,53 @@ pub(crate) fn deviations(stages: &Stages<'_>, last: &Stage<'_>, state: &State, v
 /// Deviation of the tip's position, root of the trace of its covariance, over the samples.
 ///
 /// The base and the tip's frame are taken as they are: where only a prior says how the base lies against the first axis, or
-/// the tip's frame against the features, nothing that is seen depends on it.
-fn tip(stages: &Stages<'_>, last: &Stage<'_>, state: &State, factor: f64) -> Option<TipDeviation> {
-    let freedom = gauge::with_frames_held(stages.setup, last.freedom);
-    let built = stages.build(&Stage { freedom: &freedom, ..*last }, state);
-    let mut covariance = Covariance::new(&built.graph).ok()?;
-    let tips: Vec<_> = built.tips.iter().flatten().copied().collect();
-    let every = tips.len().div_ceil(TIPS).max(1);
-    let deviation = |tip| {
+/// the tip's frame against the features, nothing that is seen depends on it. Joints are taken as they are too: how well those
+/// of a sample were read is no matter of the rig. `None` also where the tip does not follow from anything that is learned.
+fn tip(honest: &Honest<'_>, freedom: &Freedom, state: &State, verdict: &Verdict) -> Option<TipDeviation> {
+    let freedom = gauge::with_frames_held(&honest.setup, freedom);
+    if !gauge::is_tip_learned(&honest.setup, &freedom) {
+        return None;
+    }
+    let mut built = honest.build(&freedom, state, verdict);
+    let (samples, tips) = tips_at_held_joints(&mut built, state);
+    let mut solver = Solver::new(&built.graph);
+    let weak = WeakDirection::find(&built.graph, &mut solver, Some(&built.states())).ok()?;
+    let mut covariance = Covariance::with(&built.graph, solver).ok()?;
+    // Directions found are uncorrelated, so that their shares of a variance add up.
+    let direction = |weak| Direction::of_weak(honest, &built, weak);
+    let shares: Vec<Vec<f64>> =
+        weak.iter().filter_map(|weak| direction(weak).tip_motion(honest, state, &built, &samples)).collect();
+    let (mut sds, mut by_data) = (Vec::new(), Vec::new());
+    for (index, &tip) in tips.iter().enumerate() {
         let block = covariance.of(tip);
-        factor * (block[(3, 3)] + block[(4, 4)] + block[(5, 5)]).max(0.0).sqrt()
-    };
-    let mut sds: Vec<f64> = tips.into_iter().step_by(every).map(deviation).collect();
+        let variance = (block[(3, 3)] + block[(4, 4)] + block[(5, 5)]).max(0.0);
+        let of_priors: f64 = shares.iter().map(|share| share[index].powi(2)).sum();
+        sds.push(variance.sqrt());
+        by_data.push((variance - of_priors).max(0.0).sqrt());
+    }
     let largest = sds.iter().copied().reduce(f64::max)?;
-    Some(TipDeviation { median: median(&mut sds), largest, metric: gauge::length_is_known(stages.setup) })
+    Some(TipDeviation {
+        median: median(&mut sds),
+        largest,
+        by_data: median(&mut by_data),
+        metric: gauge::length_is_known(&honest.setup),
+    })
 }
 
-/// Root of the mean square of a coordinate's error over the stated noise.
-fn scatter(setup: &Setup, state: &State, verdict: &Verdict) -> f64 {
-    let distances = distances(setup, state);
-    let used: Vec<f64> = distances.iter().zip(&verdict.active).filter(|(_, used)| **used).map(|(d, _)| d * d).collect();
-    (used.iter().sum::<f64>() / (2.0 * used.len().max(1) as f64)).sqrt() / setup.sigma()
+/// Derived tips of samples, spread evenly over the recording, and which samples these are.
+fn tips_at_held_joints(built: &mut Built, state: &State) -> (Vec<usize>, Vec<Key<Pose>>) {
+    let in_use = |&sample: &usize| state.placed[sample] && built.joints[sample].is_some();
+    let samples: Vec<usize> = (0..state.joints.len()).filter(in_use).collect();
+    let every = samples.len().div_ceil(TIPS).max(1);
+    let samples: Vec<usize> = samples.into_iter().step_by(every).collect();
+    let chain = Arc::new(state.model.chain.clone());
+    let tips = samples.iter().map(|&sample| {
+        let joints = built.graph.held(DynamicVector::from_column_slice(&state.joints[sample]));
+        let tip = ForwardKinematics { chain: chain.clone(), upto: chain.len() };
+        built.graph.derive(tip, (built.base, built.parameters, joints))
+    });
+    let tips = tips.collect();
+    (samples, tips)
 }
 
 /// Standard deviations of everything that is free; poses as translation, then rotation vector.
@@ -81,11 +147,10 @@ fn by_path(
     freedom: &Freedom,
     built: &Built,
     covariance: &mut Covariance<'_>,
-    factor: f64,
 ) -> BTreeMap<String, Vec<f64>> {
     let mut by_path = BTreeMap::new();
     let diagonal = |block: nalgebra::DMatrix<f64>| -> Vec<f64> {
-        block.diagonal().iter().map(|variance| factor * variance.max(0.0).sqrt()).collect()
+        block.diagonal().iter().map(|variance| variance.max(0.0).sqrt()).collect()
     };
     let base = diagonal(covariance.of(built.base));
     let parameters = diagonal(covariance.of(built.parameters));
@@ -143,23 +208,8 @@ pub(crate) fn intrinsics_of(field: CameraField, distortion: usize) -> std::ops::
     }
 }
 
-/// A weak direction in words.
-fn words(setup: &Setup, built: &Built, weak: &WeakDirection) -> String {
-    let names: Vec<String> =
-        weak.components.iter().take(NAMED).map(|part| name(setup, built, part.node, part.coordinate)).collect();
-    let others = weak.components.len().saturating_sub(NAMED);
-    let others = if others > 0 { format!(" and {others} more") } else { String::new() };
-    let what = match weak.kind {
-        Weakness::Open => "nothing determines".to_owned(),
-        Weakness::Prior if weak.sd_ratio > 1e3 => "only a prior determines".to_owned(),
-        Weakness::Prior => format!("a prior more than the data ({:.1} to 1) determines", weak.sd_ratio),
-    };
-    let kind = if weak.components.len() == 1 { "" } else { "a combination of " };
-    format!("{what} {kind}{}{others}", names.join(", "))
-}
-
 /// A coordinate of a node by its parameter path.
-fn name(setup: &Setup, built: &Built, node: usize, coordinate: usize) -> String {
+pub(crate) fn name(setup: &Setup, built: &Built, node: usize, coordinate: usize) -> String {
     let rig = &setup.rig;
     let step = ["rotation x", "rotation y", "rotation z", "x", "y", "z"];
     if node == built.base.index() {

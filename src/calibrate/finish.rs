@@ -4,6 +4,7 @@ use super::evaluate::Errors;
 use super::graph::{State, row};
 use super::outliers::{Verdict, distances};
 use super::setup::Setup;
+use super::weak;
 use super::{Calibration, CameraErrors, Finding, Report, StageReport};
 use crate::camera::CameraModel;
 use crate::rig::{Fit, Rig};
@@ -51,7 +52,7 @@ pub(crate) fn finish(
         .collect();
     let samples = used_samples.iter().filter(|used| **used).count();
     let rejected = left_out.iter().sum();
-    gauge.extend(deviations.weak);
+    gauge.extend(weak::in_words(&deviations.weak));
     let mut rig = learned(setup, state);
     rig.fit = Some(Fit {
         samples,
@@ -80,6 +81,8 @@ pub(crate) fn finish(
         states: setup.states.words(&setup.rig.noise),
         findings: misfit.into_iter().chain(unseen).chain(verdict.findings).collect(),
         tip: deviations.tip,
+        weak: deviations.weak,
+        influence: Vec::new(),
         targets: None,
     };
     Calibration { rig, report }

@@ -158,6 +158,12 @@ pub(crate) fn with_frames_held(setup: &Setup, freedom: &Freedom) -> Freedom {
     freedom
 }
 
+/// True where the tip follows from something that is free: not where the whole chain is held, and not where tips are read.
+pub(crate) fn is_tip_learned(setup: &Setup, freedom: &Freedom) -> bool {
+    let is_free = |held: &bool| !held;
+    setup.states.chain && (freedom.base.iter().any(is_free) || freedom.parameters.iter().any(is_free))
+}
+
 /// Numbers of the first row that the base's place makes redundant, and of the last that the tip's frame does.
 fn ends(convention: Convention) -> (&'static [usize], &'static [usize]) {
     match convention {

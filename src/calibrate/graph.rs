@@ -242,6 +242,12 @@ impl Built {
         }
     }
 
+    /// Nodes of the samples: joints and tips.
+    pub fn states(&self) -> Vec<usize> {
+        let joints = self.joints.iter().flatten().map(|key| key.index());
+        joints.chain(self.tips.iter().flatten().map(|key| key.index())).collect()
+    }
+
     /// Takes the graph's values over.
     pub fn read(&self, state: &mut State) {
         state.tool = self.graph.value(self.tool);

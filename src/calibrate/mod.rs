@@ -1,10 +1,13 @@
 //! Learns a rig from a recording.
 mod anchor;
+mod cures;
 mod deviations;
+mod direction;
 pub(crate) mod evaluate;
 mod finish;
 mod gauge;
 mod graph;
+mod influence;
 mod initialise;
 mod join;
 mod kinematics;
@@ -12,6 +15,7 @@ mod known;
 mod look;
 mod motion;
 mod outliers;
+mod poorly;
 mod priors;
 mod readings;
 mod relearn;
@@ -27,17 +31,20 @@ mod trunk;
 mod unknown;
 mod variances;
 mod visual;
+mod weak;
 
 pub use evaluate::{CameraErrors, Errors, Evaluation, evaluate};
+pub use influence::{Influence, most_influential, worst_fitting};
 pub use relearn::relearn;
 pub use report::{Calibration, Finding, Report, StageReport, TipDeviation};
 pub use selection::{NoiseTrial, select_noise};
 pub use targets::{Disagreement, TargetReport};
+pub use weak::{Combination, DeterminedBy};
 
 use crate::Error;
 use crate::recording::Recording;
 use crate::rig::{Noise, Parameter, Rig};
-use deviations::deviations;
+use deviations::{Honest, deviations, scatter};
 use finish::finish;
 use graph::{Priors, State};
 use handeye_solvers::Loss;
@@ -54,11 +61,13 @@ pub struct Options {
     /// Whether the noise of pixels, joints, poses and actions is estimated from the data (variance components). What the
     /// rig states is where that starts; where it says that something recorded is exact, a guess is.
     pub estimate_noise: bool,
+    /// Whether the influence of every sample is computed: takes one linearisation per sample.
+    pub influence: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { seed: 1, estimate_noise: false }
+        Options { seed: 1, estimate_noise: false, influence: false }
     }
 }
 
@@ -103,9 +112,10 @@ pub fn calibrate(
         reports.append(&mut attempt.reports);
         let settled = attempt.noise.is_none_or(|noise| variances::change(&setup.rig.noise, &noise) < SETTLED);
         if settled || round == ROUNDS {
-            let Attempt { state, verdict, converged, gauge, deviations, .. } = attempt;
+            let Attempt { state, verdict, converged, gauge, deviations, influence, .. } = attempt;
             let mut learned = finish(&setup, &state, verdict, reports, converged && settled, gauge, deviations);
             learned.report.noise = options.estimate_noise.then_some(setup.rig.noise);
+            learned.report.influence = influence;
             return Ok(learned);
         }
         setup.rig.noise = attempt.noise.unwrap_or(setup.rig.noise);
@@ -133,6 +143,7 @@ struct Attempt {
     converged: bool,
     gauge: Vec<String>,
     deviations: deviations::Deviations,
+    influence: Vec<Influence>,
     /// What the noise seems to be, where that is asked for.
     noise: Option<Noise>,
 }
@@ -156,7 +167,9 @@ fn attempt(
     let verdict = robust::fit(&mut state, &freedom, &mut stages)?;
     robust::place_moved(&mut state, &mut freedom, &verdict, &mut stages)?;
     let takes_part = |index: usize| verdict.active[index];
-    let last = Stage { name: "end to end", freedom: &freedom, loss: Loss::Cauchy(TAILS), takes_part: &takes_part };
+    // Where the images are noisier than stated, the tails begin later.
+    let loss = Loss::Cauchy(TAILS * scatter(setup, &state, &verdict).max(1.0));
+    let last = Stage { name: "end to end", freedom: &freedom, loss, takes_part: &takes_part };
     let converged = stages.minimize(&last, &mut state)?.termination.converged();
     check_cameras(setup, &state)?;
     let noise = if options.estimate_noise {
@@ -166,9 +179,11 @@ fn attempt(
     } else {
         None
     };
-    let deviations = deviations(&stages, &last, &state, &verdict);
+    let honest = Honest::new(&stages, &last, &state, &verdict);
+    let deviations = deviations(&honest, &freedom, &state, &verdict);
+    let influence = if options.influence { influence::influence(&stages, &last, &state, &verdict) } else { Vec::new() };
     let reports = std::mem::take(&mut stages.reports);
-    Ok(Attempt { state, verdict, reports, converged, gauge, deviations, noise })
+    Ok(Attempt { state, verdict, reports, converged, gauge, deviations, influence, noise })
 }
 
 /// True where targets are what there is to learn from. Where joints and pixels were recorded too, pixels say more.

@@ -1,5 +1,5 @@
 //! What a calibration did and found, and how good it is.
-use super::{CameraErrors, TargetReport};
+use super::{CameraErrors, Combination, Influence, TargetReport};
 use crate::rig::{Noise, Rig};
 
 /// A learned rig and how it came about.
@@ -42,6 +42,10 @@ pub struct Report {
     pub findings: Vec<Finding>,
     /// Standard deviation of the tip over the recorded workspace; `None` where the data leave the rig open.
     pub tip: Option<TipDeviation>,
+    /// Combinations of numbers that nothing, or a prior more than the data, determines; the weakest first.
+    pub weak: Vec<Combination>,
+    /// What leaving out each sample would change, where [`Options::influence`](super::Options) asks for it.
+    pub influence: Vec<Influence>,
     /// What was learned from targets, where these and not pixels were used; the pixel distances are 0 then.
     pub targets: Option<TargetReport>,
 }
@@ -157,6 +161,9 @@ pub struct TipDeviation {
     pub median: f64,
     /// Largest over the samples.
     pub largest: f64,
+    /// Median of what is left where everything is known that a prior determines more than the data do: what the data alone
+    /// answer for.
+    pub by_data: f64,
     /// True where it is in metres; false where nothing metric is known and it is in the model's unit.
     pub metric: bool,
 }

@@ -66,73 +66,109 @@ pub(super) fn estimate(
     state: &State,
     verdict: &Verdict,
 ) -> Result<Noise, Error> {
-    let setup = stages.setup;
-    let (states, before) = (&setup.states, setup.rig.noise);
-    let mut built = stages.build(last, state);
-    let motions: Vec<Option<Key<Pose>>> = (0..setup.len())
-        .map(|sample| {
-            let on = (built.tips[sample]?, *built.tips.get(sample + 1)?.as_ref()?);
-            states.pose_actions[sample]?;
-            Some(built.graph.derive(Motion, on))
-        })
-        .collect();
-    let free = count_free(last.freedom, &built) + if setup.tool_is_open() { 6 } else { 0 };
-    let mut covariance = Covariance::new(&built.graph)?;
-    let taken_by_priors = leverage_of_priors(stages.priors, last.freedom, &built, &mut covariance);
-    let mut taken = taken_by_priors;
-
-    let (mut joints, mut joint_action) = (Component::default(), Component::default());
-    let (mut rot, mut xyz) = (Component::default(), Component::default());
-    let (mut action_rot, mut action_xyz) = (Component::default(), Component::default());
-    for sample in (0..setup.len()).filter(|&sample| state.placed[sample]) {
-        if let (Some(key), Some(readings), true) =
-            (built.joints[sample], &states.readings[sample], state.trusted[sample])
-            && !states.exact[sample]
-        {
-            let squares = state.joints[sample].iter().zip(readings).map(|(a, b)| (a - b).powi(2)).sum();
-            let leverage = covariance.of(key).trace() / before.joints.powi(2);
-            joints.add(squares, readings.len() as f64, leverage);
-            taken += leverage;
-        }
-        if let (Some(action), true) = (&states.joint_actions[sample], before.joint_action > 0.0)
-            && let (Some(a), Some(b)) = (built.joints[sample], built.joints[sample + 1])
-        {
-            let moved = state.joints[sample + 1].iter().zip(&state.joints[sample]).map(|(next, now)| next - now);
-            let squares = moved.zip(action).map(|(moved, action)| (moved - action).powi(2)).sum();
-            let both = covariance.of(a).trace() + covariance.of(b).trace() - 2.0 * covariance.between(a, b).trace();
-            let leverage = both / before.joint_action.powi(2);
-            joint_action.add(squares, action.len() as f64, leverage);
-            taken += leverage;
-        }
-        let read = states.poses[sample].filter(|_| state.trusted[sample] && before.pose.is_noisy());
-        if let (Some(reading), Some(tip)) = (read, built.tips[sample]) {
-            let seen = built.graph.value(tip) * state.tool;
-            taken +=
-                add_pose(&mut rot, &mut xyz, &seen, &reading, &covariance.of(tip), before.pose.rot, before.pose.xyz);
-        }
-        if let (Some(action), Some(motion)) = (states.pose_actions[sample], motions[sample])
-            && before.pose_action.is_noisy()
-        {
-            let (moved, block) = (built.graph.value(motion), covariance.of(motion));
-            let (rot, xyz) = (before.pose_action.rot, before.pose_action.xyz);
-            taken += add_pose(&mut action_rot, &mut action_xyz, &moved, &action, &block, rot, xyz);
-        }
-    }
-    // All leverages add up to the number of free coordinates: what is left is that of the pixels.
-    let mut pixels = Component::default();
-    let used = distances(setup, state).into_iter().zip(&verdict.active).filter(|(_, active)| **active);
-    for (distance, _) in used {
-        pixels.add(distance * distance, 2.0, 0.0);
-    }
-    pixels.add(0.0, 0.0, (free as f64 - taken).max(0.0));
-    let mut noise = before;
-    noise.pixels = pixels.sigma(setup.sigma());
-    noise.joints = joints.sigma(before.joints);
-    noise.joint_action = joint_action.sigma(before.joint_action);
-    (noise.pose.rot, noise.pose.xyz) = (rot.sigma(before.pose.rot), xyz.sigma(before.pose.xyz));
-    noise.pose_action.rot = action_rot.sigma(before.pose_action.rot);
-    noise.pose_action.xyz = action_xyz.sigma(before.pose_action.xyz);
+    let all = Components::new(stages, last, state, verdict)?;
+    let mut noise = stages.setup.rig.noise;
+    noise.pixels = all.pixels.sigma(stages.setup.sigma());
+    noise.joints = all.joints.sigma(noise.joints);
+    noise.joint_action = all.joint_action.sigma(noise.joint_action);
+    noise.pose.rot = all.rot.sigma(noise.pose.rot);
+    noise.pose.xyz = all.xyz.sigma(noise.pose.xyz);
+    noise.pose_action.rot = all.action_rot.sigma(noise.pose_action.rot);
+    noise.pose_action.xyz = all.action_xyz.sigma(noise.pose_action.xyz);
     Ok(noise)
+}
+
+/// How many coordinates of the pixels in use are left over once everything is estimated.
+pub(super) fn redundancy_of_pixels(
+    stages: &Stages<'_>,
+    last: &Stage<'_>,
+    state: &State,
+    verdict: &Verdict,
+) -> Result<f64, Error> {
+    Ok(Components::new(stages, last, state, verdict)?.pixels.redundancy)
+}
+
+/// Every group of measurements.
+struct Components {
+    pixels: Component,
+    joints: Component,
+    joint_action: Component,
+    rot: Component,
+    xyz: Component,
+    action_rot: Component,
+    action_xyz: Component,
+}
+
+impl Components {
+    fn new(stages: &Stages<'_>, last: &Stage<'_>, state: &State, verdict: &Verdict) -> Result<Self, Error> {
+        let setup = stages.setup;
+        let (states, before) = (&setup.states, setup.rig.noise);
+        let mut built = stages.build(last, state);
+        let motions: Vec<Option<Key<Pose>>> = (0..setup.len())
+            .map(|sample| {
+                let on = (built.tips[sample]?, *built.tips.get(sample + 1)?.as_ref()?);
+                states.pose_actions[sample]?;
+                Some(built.graph.derive(Motion, on))
+            })
+            .collect();
+        let free = count_free(last.freedom, &built) + if setup.tool_is_open() { 6 } else { 0 };
+        let mut covariance = Covariance::new(&built.graph)?;
+        let taken_by_priors = leverage_of_priors(stages.priors, last.freedom, &built, &mut covariance);
+        let mut taken = taken_by_priors;
+
+        let (mut joints, mut joint_action) = (Component::default(), Component::default());
+        let (mut rot, mut xyz) = (Component::default(), Component::default());
+        let (mut action_rot, mut action_xyz) = (Component::default(), Component::default());
+        for sample in (0..setup.len()).filter(|&sample| state.placed[sample]) {
+            if let (Some(key), Some(readings), true) =
+                (built.joints[sample], &states.readings[sample], state.trusted[sample])
+                && !states.exact[sample]
+            {
+                let squares = state.joints[sample].iter().zip(readings).map(|(a, b)| (a - b).powi(2)).sum();
+                let leverage = covariance.of(key).trace() / before.joints.powi(2);
+                joints.add(squares, readings.len() as f64, leverage);
+                taken += leverage;
+            }
+            if let (Some(action), true) = (&states.joint_actions[sample], before.joint_action > 0.0)
+                && let (Some(a), Some(b)) = (built.joints[sample], built.joints[sample + 1])
+            {
+                let moved = state.joints[sample + 1].iter().zip(&state.joints[sample]).map(|(next, now)| next - now);
+                let squares = moved.zip(action).map(|(moved, action)| (moved - action).powi(2)).sum();
+                let both = covariance.of(a).trace() + covariance.of(b).trace() - 2.0 * covariance.between(a, b).trace();
+                let leverage = both / before.joint_action.powi(2);
+                joint_action.add(squares, action.len() as f64, leverage);
+                taken += leverage;
+            }
+            let read = states.poses[sample].filter(|_| state.trusted[sample] && before.pose.is_noisy());
+            if let (Some(reading), Some(tip)) = (read, built.tips[sample]) {
+                let seen = built.graph.value(tip) * state.tool;
+                taken += add_pose(
+                    &mut rot,
+                    &mut xyz,
+                    &seen,
+                    &reading,
+                    &covariance.of(tip),
+                    before.pose.rot,
+                    before.pose.xyz,
+                );
+            }
+            if let (Some(action), Some(motion)) = (states.pose_actions[sample], motions[sample])
+                && before.pose_action.is_noisy()
+            {
+                let (moved, block) = (built.graph.value(motion), covariance.of(motion));
+                let (rot, xyz) = (before.pose_action.rot, before.pose_action.xyz);
+                taken += add_pose(&mut action_rot, &mut action_xyz, &moved, &action, &block, rot, xyz);
+            }
+        }
+        // All leverages add up to the number of free coordinates: what is left is that of the pixels.
+        let mut pixels = Component::default();
+        let used = distances(setup, state).into_iter().zip(&verdict.active).filter(|(_, active)| **active);
+        for (distance, _) in used {
+            pixels.add(distance * distance, 2.0, 0.0);
+        }
+        pixels.add(0.0, 0.0, (free as f64 - taken).max(0.0));
+        Ok(Components { pixels, joints, joint_action, rot, xyz, action_rot, action_xyz })
+    }
 }
 
 /// Largest relative change of a standard deviation.

@@ -5,6 +5,7 @@ use super::folds::Folds;
 use super::inputs::{check_output, read_recordings, read_rig};
 use super::noise;
 use super::progress::Bar;
+use super::trust;
 use super::words::{cameras_json, count, duration, error_table};
 use clap::Args;
 use handeye::Error;
@@ -47,6 +48,9 @@ pub struct Calibrate {
     /// Estimate the noise of pixels, joints, poses and actions from the data; [noise] of the rig is where that starts
     #[arg(long)]
     estimate_noise: bool,
+    /// Also report how far leaving out each sample would move the tip, and which samples fit worst
+    #[arg(long)]
+    influence: bool,
     /// Pick the noise of joints or poses, relative to that of pixels, by how well samples held out are predicted
     #[arg(long, conflicts_with = "estimate_noise")]
     select_noise: bool,
@@ -64,7 +68,7 @@ impl Calibrate {
         let recording = read_recordings(&self.recordings, input.as_ref())?;
         check_output(&self.output, &self.recordings)?;
         let (mut rig, text) = input.map_or_else(|| (Rig::default(), None), |input| (input.rig, Some(input.text)));
-        let options = Options { seed: self.seed, estimate_noise: self.estimate_noise };
+        let options = Options { seed: self.seed, estimate_noise: self.estimate_noise, influence: self.influence };
         let bar = Bar::new(is_json);
         let (trials, folds, calibration, seconds) = on_threads(self.threads, || {
             let mut trials = Vec::new();
@@ -117,9 +121,9 @@ fn on_threads<T: Send>(threads: Option<u16>, work: impl FnOnce() -> Result<T, Er
     pool.map_err(|error| Error::Unusable(format!("--threads {threads}: {error}")))?.install(work)
 }
 
-fn describe(before: &Rig, learned: &Rig, report: &Report, seconds: f64) -> String {
+fn describe(before: &Rig, learned_rig: &Rig, report: &Report, seconds: f64) -> String {
     let (samples, detections) = (count(report.samples, "sample"), count(report.observations, "detection"));
-    let learned = learned_in_words(before, learned);
+    let learned = learned_in_words(before, learned_rig);
     let mut text = format!("{learned} from {samples} with {detections}, in {}\n\n", duration(seconds));
     match &report.targets {
         Some(targets) => text += &targets_in_words(targets, report.rejected),
@@ -130,6 +134,8 @@ fn describe(before: &Rig, learned: &Rig, report: &Report, seconds: f64) -> Strin
     }
     if let Some(tip) = &report.tip {
         text += &format!("\nthe tip's position is known to {}\n", tip_in_words(tip));
+    } else {
+        text += &trust::cameras_in_words(learned_rig);
     }
     for (title, lines) in [
         ("what is known of the robot's state", report.states.clone()),
@@ -141,7 +147,7 @@ fn describe(before: &Rig, learned: &Rig, report: &Report, seconds: f64) -> Strin
             lines.iter().for_each(|line| text += &format!("  {line}\n"));
         }
     }
-    text
+    text + &trust::text(report)
 }
 
 fn targets_in_words(targets: &TargetReport, rejected: usize) -> String {
@@ -191,13 +197,16 @@ fn together(report: &Report) -> Errors {
 }
 
 fn tip_in_words(tip: &TipDeviation) -> String {
-    let TipDeviation { median, largest, metric } = *tip;
-    if metric {
+    let TipDeviation { median, largest, by_data, metric } = *tip;
+    let [median_mm, largest_mm, by_data_mm] = [median, largest, by_data].map(|length| 1e3 * length);
+    if metric && by_data < 0.9 * median {
         return format!(
-            "{:.3} mm (median standard deviation over the samples; largest {:.3} mm)",
-            1e3 * median,
-            1e3 * largest
+            "{by_data_mm:.3} mm by the data (median standard deviation over the samples), and to {median_mm:.3} mm (largest \
+             {largest_mm:.3} mm) with what only priors determine"
         );
+    }
+    if metric {
+        return format!("{median_mm:.3} mm (median standard deviation over the samples; largest {largest_mm:.3} mm)");
     }
     format!(
         "{median:.2e} (median standard deviation over the samples, largest {largest:.2e}; nothing metric is known, so in the model's unit)"
@@ -230,10 +239,15 @@ pub fn report_json(report: &Report) -> Value {
         "states": report.states,
         "noise": report.noise.as_ref().map(noise::json),
         "findings": report.findings.iter().map(finding_json).collect::<Vec<_>>(),
-        "tip_sd": report.tip.map(|tip| json!({ "median": tip.median, "largest": tip.largest, "metric": tip.metric })),
+        "tip_sd": report.tip.map(|tip| json!({
+            "median": tip.median, "largest": tip.largest, "by_data": tip.by_data, "metric": tip.metric
+        })),
         "targets": report.targets.as_ref().map(targets_json),
         "tip_sd_mm": metric.map(|tip| 1e3 * tip.median),
         "tip_sd_largest_mm": metric.map(|tip| 1e3 * tip.largest),
+        "tip_sd_by_data_mm": metric.map(|tip| 1e3 * tip.by_data),
+        "weak": report.weak.iter().map(trust::weak_json).collect::<Vec<_>>(),
+        "influence": trust::influence_json(&report.influence),
     })
 }
 

@@ -14,6 +14,7 @@ mod progress;
 mod simulate;
 mod survey;
 mod table;
+mod trust;
 mod words;
 
 pub use answer::{Refusal, print};

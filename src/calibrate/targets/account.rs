@@ -114,6 +114,8 @@ impl Account<'_> {
             noise: None,
             findings: Vec::new(),
             tip: None,
+            weak: Vec::new(),
+            influence: Vec::new(),
             targets: Some(targets),
         };
         Ok(Calibration { rig, report })

@@ -1,0 +1,90 @@
+//! How much of a calibration to trust, for people and for programs.
+use super::table::Table;
+use handeye::calibrate::{Combination, DeterminedBy, Influence, Report, most_influential, worst_fitting};
+use handeye::rig::Rig;
+use serde_json::{Value, json};
+
+/// Samples that are listed.
+const LISTED: usize = 10;
+
+/// The samples that matter most, where that was asked for.
+pub fn text(report: &Report) -> String {
+    if report.influence.is_empty() {
+        return String::new();
+    }
+    let is_metric = report.tip.is_some_and(|tip| tip.metric);
+    let mut text = String::new();
+    for (title, samples) in [
+        ("the most influential samples", most_influential(&report.influence, LISTED)),
+        ("the samples that fit worst", worst_fitting(&report.influence, LISTED)),
+    ] {
+        if samples.is_empty() {
+            continue;
+        }
+        let mut table = Table::new(&["sample", "without it the tip moves", "rms px"]);
+        for Influence { sample, tip, rms_px } in samples {
+            let tip = match tip {
+                Some(tip) if !tip.is_finite() => "nothing holds it".to_owned(),
+                Some(tip) if is_metric => format!("{:.4} mm", 1e3 * tip),
+                Some(tip) => format!("{tip:.2e}"),
+                None => "-".to_owned(),
+            };
+            table.row([sample.to_string(), tip, format!("{rms_px:.3}")]);
+        }
+        text += &format!("\n{title} (numbered from 0):\n{table}");
+    }
+    text
+}
+
+/// How well the cameras' poses are known, for rigs whose tip is known beforehand.
+pub fn cameras_in_words(learned: &Rig) -> String {
+    let mut text = String::new();
+    for camera in &learned.cameras {
+        let sd = learned.fit.as_ref().and_then(|fit| fit.sd.get(&format!("cameras.{}.pose", camera.name)));
+        let Some([x, y, z, turns @ ..]) = sd.map(Vec::as_slice) else { continue };
+        let turn = turns.iter().map(|sd| sd * sd).sum::<f64>().sqrt();
+        let [mm, deg] = [1e3 * (x * x + y * y + z * z).sqrt(), turn.to_degrees()];
+        text += &format!(
+            "\nthe pose of camera `{}` is known to {mm:.3} mm and {deg:.3}° (standard deviation)",
+            camera.name
+        );
+    }
+    if !text.is_empty() {
+        text.push('\n');
+    }
+    text
+}
+
+/// A weak combination.
+pub fn weak_json(weak: &Combination) -> Value {
+    let (determined_by, sd_ratio, sd) = match weak.determined_by {
+        DeterminedBy::Nothing => ("nothing", None, None),
+        DeterminedBy::Prior(ratio) => ("prior", ratio.is_finite().then_some(ratio), None),
+        DeterminedBy::Poorly { sd, .. } => ("data, poorly", None, Some(sd)),
+    };
+    let numbers: Vec<Value> = weak.numbers.iter().map(|(path, by)| json!({ "path": path, "weight": by })).collect();
+    json!({
+        "numbers": numbers,
+        "determined_by": determined_by,
+        "sd_data_over_prior": sd_ratio,
+        "sd": sd,
+        "tip_sd": weak.tip,
+        "cure": weak.cure,
+        "text": weak.to_string(),
+    })
+}
+
+/// The most influential and the worst-fitting samples; null where that was not asked for.
+pub fn influence_json(all: &[Influence]) -> Value {
+    if all.is_empty() {
+        return Value::Null;
+    }
+    let list = |samples: Vec<Influence>| -> Vec<Value> {
+        let one = |one: Influence| json!({ "sample": one.sample, "tip": one.tip, "rms_px": one.rms_px });
+        samples.into_iter().map(one).collect()
+    };
+    json!({
+        "most_influential": list(most_influential(all, LISTED)),
+        "worst_fitting": list(worst_fitting(all, LISTED)),
+    })
+}
