@@ -26,6 +26,7 @@ mod unknown;
 mod variances;
 mod visual;
 
+pub(crate) use evaluate::median;
 pub use evaluate::{CameraErrors, Errors, Evaluation, evaluate};
 pub use report::{Calibration, Finding, Report, StageReport, TipDeviation};
 pub use selection::{NoiseTrial, select_noise};

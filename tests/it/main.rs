@@ -9,6 +9,7 @@ mod experiments;
 mod folds;
 mod learning;
 mod malformed_input;
+mod monitor;
 mod not_enough;
 mod readme;
 mod recording_files;
