@@ -86,8 +86,10 @@ fn tell(sample: usize, event: &Event, rig: &Rig) -> Option<(String, Value)> {
         Event::Skipped | Event::Unchanged => None,
         Event::Changed(change) => {
             let name = change.cause.name(rig);
+            let others: Vec<String> = change.as_good().map(|cause| cause.name(rig)).collect();
+            let or = if others.is_empty() { String::new() } else { format!(" (or {})", others.join(", ")) };
             let line = format!(
-                "sample {sample}: {name} moved at sample {} (p < {:.0e} of a false alarm)\n",
+                "sample {sample}: {name}{or} moved at sample {} (p < {:.0e} of a false alarm)\n",
                 change.since,
                 change.p_value.max(f64::MIN_POSITIVE)
             );
@@ -97,7 +99,7 @@ fn tell(sample: usize, event: &Event, rig: &Rig) -> Option<(String, Value)> {
                 .map(|score| json!({"cause": score.cause.name(rig), "bic": score.bic, "median_px": score.median_px}))
                 .collect();
             let object = json!({"event": "changed", "sample": sample, "since": change.since, "cause": name,
-                "p_value": change.p_value, "scores": scores});
+                "as_good": others, "p_value": change.p_value, "scores": scores});
             Some((line, object))
         }
         Event::Relearned { cause, samples, .. } => {

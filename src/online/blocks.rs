@@ -207,6 +207,9 @@ const WIDTH: f64 = 3.0;
 /// An explanation explains where the samples are then within this many times the usual median distance.
 const EXPLAINED: f64 = 2.5;
 
+/// Explanations whose scores differ by less are the same.
+const SAME: f64 = 1e-3;
+
 /// Moves each part alone to explain the samples: scores, best first, and the model that the best leads to. Where not even the
 /// best explains them, [`Cause::Unexplained`] comes first and the model is as before.
 pub(super) fn explain(model: &Model, samples: &[Seen], sigma: f64, usual_px: f64) -> (Vec<Score>, Model) {
@@ -228,7 +231,10 @@ pub(super) fn explain(model: &Model, samples: &[Seen], sigma: f64, usual_px: f64
             found.push((Score { cause, bic, median_px }, moved));
         }
     }
-    found.sort_by(|a, b| a.0.bic.total_cmp(&b.0.bic));
+    // Of explanations that are the same motion, as of the only camera and of the base, the first.
+    let least = found.iter().map(|(score, _)| score.bic).fold(f64::INFINITY, f64::min);
+    let tied = |score: &Score| if score.bic < least + SAME { least } else { score.bic };
+    found.sort_by(|(a, _), (b, _)| tied(a).total_cmp(&tied(b)));
     let explains = found.first().is_some_and(|(best, _)| best.median_px < EXPLAINED * usual_px);
     let best = found.first().filter(|_| explains).map_or_else(|| model.clone(), |(_, moved)| moved.clone());
     let mut scores: Vec<Score> = found.into_iter().map(|(score, _)| score).collect();

@@ -73,3 +73,15 @@ pub struct Change {
     /// Every explanation, best first.
     pub scores: Vec<Score>,
 }
+
+/// Explanations whose scores differ by less are not told apart: a likelihood ratio of e.
+const AS_GOOD: f64 = 2.0;
+
+impl Change {
+    /// Other parts whose motion explains the samples as well: only samples at other positions, or another camera, can tell.
+    pub fn as_good(&self) -> impl Iterator<Item = Cause> {
+        let best = self.scores.first().map_or(f64::INFINITY, |score| score.bic);
+        let others = self.scores.iter().skip(1).filter(move |score| score.bic < best + AS_GOOD);
+        others.filter(|_| self.cause != Cause::Unexplained).map(|score| score.cause)
+    }
+}

@@ -53,7 +53,11 @@ impl Monitor {
         if !(options.false_alarm_rate > 0.0 && options.false_alarm_rate < 1.0) {
             return unusable(format!("a false-alarm rate of {}: it is in (0, 1)", options.false_alarm_rate));
         }
-        if options.buffer == 0 || options.relearn_samples < 2 || !(options.follow_ratio > 1.0) {
+        if options.buffer == 0
+            || options.relearn_samples < 2
+            || options.follow_ratio.is_nan()
+            || options.follow_ratio <= 1.0
+        {
             return unusable(
                 "a monitor needs a buffer, 2 samples to relearn from and a follow ratio above 1".to_owned(),
             );
