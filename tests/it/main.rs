@@ -13,6 +13,7 @@ mod monitor;
 mod not_enough;
 mod readme;
 mod recording_files;
+mod relearn;
 mod rig_files;
 mod simulate;
 mod states;
