@@ -7,7 +7,7 @@ use handeye::online::{Event, Monitor, MonitorOptions};
 use handeye::simulate::{SimulateOptions, simulate};
 
 /// Of 10 changes of each kind that are seen with a probability of 0.95, fewer than 8 are with one of 1.2 %; over all 90, 79 or
-/// fewer are with 0.4 %.
+/// fewer are with 0.5 %.
 #[test]
 fn changes_are_found_within_three_samples_and_their_cause_is_named() {
     let rigs: Vec<_> = (1..=10).map(|seed| (seed, learned(seed).expect("rigs of these seeds are learned"))).collect();
