@@ -33,6 +33,7 @@ mod variances;
 mod visual;
 mod weak;
 
+pub(crate) use evaluate::median;
 pub use evaluate::{CameraErrors, Errors, Evaluation, evaluate};
 pub use influence::{Influence, most_influential, worst_fitting};
 pub use relearn::relearn;

@@ -9,6 +9,7 @@ mod evaluate;
 mod experiment;
 mod folds;
 mod inputs;
+mod monitor;
 mod noise;
 mod progress;
 mod simulate;
@@ -54,6 +55,7 @@ enum Command {
     Simulate(simulate::Simulate),
     Calibrate(calibrate::Calibrate),
     Evaluate(evaluate::Evaluate),
+    Monitor(monitor::MonitorCommand),
     Experiment(experiment::ExperimentCommand),
     Completions(completions::Completions),
 }
@@ -74,6 +76,7 @@ impl Cli {
             Command::Simulate(simulate) => simulate.run(),
             Command::Calibrate(calibrate) => calibrate.run(self.json),
             Command::Evaluate(evaluate) => evaluate.run(),
+            Command::Monitor(monitor) => monitor.run(),
             Command::Experiment(experiment) => experiment.run(),
             Command::Completions(completions) => completions.run(),
         }

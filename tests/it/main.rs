@@ -10,6 +10,7 @@ mod folds;
 mod influence;
 mod learning;
 mod malformed_input;
+mod monitor;
 mod not_enough;
 mod readme;
 mod recording_files;
