@@ -2,10 +2,10 @@
 """Hand-eye calibration with a board on a table: median errors of `handeye calibrate` beside those of OpenCV on the same trials.
 
     pip install numpy scipy 'opencv-python-headless<5'
-    python benches/hand_eye_board.py [--handeye target/release/handeye] [--trials 100] [--mode targets|pixels]
+    python benches/hand_eye_board.py [--handeye target/release/handeye] [--trials 100] [--mode targets|pixels] [--plain]
 
 A camera on the hand (640 x 480, f = 800) sees a board of 8 x 6 corners, 30 mm apart, from 15 poses, with 0.3 px of noise; the
-robot's poses are noisy. The rig states the noise of the robot; the noise of the detections is estimated.
+robot's poses are noisy. The rig states the noise of the robot, and each detection of the board its covariance, unless --plain.
 """
 import argparse, json, pathlib, subprocess, tempfile, tomllib
 import cv2, numpy as np
@@ -69,14 +69,30 @@ def detected(pixels):
     return pose(rotvec.ravel(), xyz.ravel())
 
 
-def learn(program, samples, sd_xyz, sd_rot, mode):
+def covariance(seen):
+    """Of translation and rotation vector along the camera's axes, from the pixels' noise to first order."""
+    turned = CORNERS @ seen[:3, :3].T
+    information = np.zeros((6, 6))
+    for lever, (x, y, z) in zip(turned, turned + seen[:3, 3]):
+        of_point = FOCAL / z * np.array([[1, 0, -x / z], [0, 1, -y / z]])
+        skew = np.array([[0, -lever[2], lever[1]], [lever[2], 0, -lever[0]], [-lever[1], lever[0], 0]])
+        jacobian = of_point @ np.c_[np.eye(3), -skew] / NOISE
+        information += jacobian.T @ jacobian
+    return np.linalg.inv(information)
+
+
+def learn(program, samples, sd_xyz, sd_rot, mode, plain):
     """tip_from_camera."""
     camera = {"size": SIZE, "fx": FOCAL, "fy": FOCAL, "cx": CENTRE[0], "cy": CENTRE[1]}
     lines = [{"format": "handeye-recording", "version": 1, "joints": [], "cameras": {"camera": camera}}]
     for tip, pixels in samples:
         line = {"pose": written(tip)}
         if mode == "targets":
-            line["targets"] = {"camera": {"board": written(detected(pixels))}}
+            seen = detected(pixels)
+            board = written(seen)
+            if not plain:
+                board["covariance"] = covariance(seen).ravel().tolist()
+            line["targets"] = {"camera": {"board": board}}
         else:
             line["pixels"] = {"camera": {f"c{i}": uv.tolist() for i, uv in enumerate(pixels)}}
         lines.append(line)
@@ -115,6 +131,7 @@ def main():
     parser.add_argument("--handeye", default="target/release/handeye")
     parser.add_argument("--trials", type=int, default=100)
     parser.add_argument("--mode", choices=["targets", "pixels"], default="targets")
+    parser.add_argument("--plain", action="store_true", help="detections without their covariance: it is estimated")
     args = parser.parse_args()
     print(f"median errors of the camera's pose on the tip, {args.trials} trials, {args.mode}")
     print(f"{'robot noise':>18}   {'handeye':>20}   {'OpenCV, Park':>20}   most that is accepted")
@@ -123,7 +140,7 @@ def main():
         ours, peer = [], []
         for _ in range(args.trials):
             x, _, samples = trial(random, count, sd_xyz, sd_rot)
-            ours.append(error(learn(args.handeye, samples, sd_xyz, sd_rot, args.mode), x))
+            ours.append(error(learn(args.handeye, samples, sd_xyz, sd_rot, args.mode, args.plain), x))
             peer.append(error(park(samples), x))
         cells = ["{:8.3f} mm {:6.3f}°".format(*np.median(rows, axis=0)) for rows in (ours, peer)]
         print(f"{1e3 * sd_xyz:5.1f} mm {np.degrees(sd_rot):7.2f}°   {cells[0]:>20}   {cells[1]:>20}   {bar:.2f} mm")

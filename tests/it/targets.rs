@@ -55,7 +55,7 @@ impl World {
         seen.translation *= spoilt.scale.unwrap_or(1.0);
         let error = noise(random, spoilt.target);
         let seen = Pose { rotation: seen.rotation * error.rotation, translation: seen.translation + error.translation };
-        let targets = vec![TargetDetection { camera: 0, target: "tag".into(), pose: seen }];
+        let targets = vec![TargetDetection { camera: 0, target: "tag".into(), pose: seen, covariance: None }];
         Sample { pose: Some(tip * noise(random, spoilt.robot)), targets, ..Sample::default() }
     }
 
