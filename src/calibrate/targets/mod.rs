@@ -250,20 +250,14 @@ fn residual(setup: &Setup, state: &State, index: usize) -> [f64; 6] {
     TargetSeen { seen: view.seen }.residual::<f64>(on)
 }
 
-/// Standard deviations of the six numbers over all views, from those that are no outliers by the median.
+/// Standard deviations of the six numbers over all views, from medians.
 fn scatter(setup: &Setup, state: &State) -> [f64; 6] {
     let residuals: Vec<[f64; 6]> = (0..setup.views.len()).map(|index| residual(setup, state, index)).collect();
     std::array::from_fn(|k| {
-        let rms = |limit: f64| {
-            let inside = || residuals.iter().map(|r| r[k]).filter(|r| r.abs() <= limit);
-            (inside().map(|r| r * r).sum::<f64>() / inside().count().max(1) as f64).sqrt()
-        };
         let mut sizes: Vec<f64> = residuals.iter().map(|r| r[k].abs()).collect();
         sizes.sort_by(f64::total_cmp);
-        // Half of a Gaussian is within 0.6745 standard deviations; the rms of what is within 3 is 0.9865 of one.
-        let median = sizes[sizes.len() / 2] / 0.6745;
-        // Not below what arithmetic leaves.
-        (rms(3.0 * median) / 0.9865).max(1e-9)
+        // Half of a Gaussian is within 0.6745 standard deviations; not below what arithmetic leaves.
+        (sizes[sizes.len() / 2] / 0.6745).max(1e-9)
     })
 }
 
