@@ -81,11 +81,6 @@ def write(seq, folder, stated):
             noise.append(f'pose = {{ xyz = {m["robot_trans_std_m"]!r}, rot = {m["robot_rot_std_rad"]!r} }}')
     if noise:
         lines += ["[noise]", *noise]
-    if with_joints:
-        # What a workshop holds when it builds an arm: a few tenths of a millimetre and hundredths of a degree.
-        lines += ["[estimate.prior]"]
-        for name in joints:
-            lines += [f'"robot.joints.{name}.{key}" = {sd}' for key, sd in (("offset", 0.001), ("d", 0.0007), ("a", 0.0007), ("alpha", 0.001))]
     rig = folder / "rig.toml"
     rig.write_text("\n".join(lines) + "\n")
     return recording, rig

@@ -23,6 +23,8 @@ pub(crate) struct States {
     pub starts: Vec<Option<Start>>,
     /// How many poses say nothing, for want of their noise.
     unused_poses: usize,
+    /// How many poses of targets there are, which say nothing beside pixels.
+    unused_targets: usize,
 }
 
 /// A first value of a state.
@@ -105,6 +107,7 @@ impl States {
         self.readings.push(sample.joints.clone().filter(|_| chain));
         self.poses.push(sample.pose.filter(|_| use_pose));
         self.unused_poses += usize::from(sample.pose.is_some() && !use_pose);
+        self.unused_targets += sample.targets.len();
         self.joint_actions.push(sample.joint_action.clone().filter(|_| chain));
         self.pose_actions.push(sample.pose_action.filter(|_| !chain || noise.pose_action.is_noisy()));
         self.exact.push(exact);
@@ -200,6 +203,13 @@ impl States {
             } else {
                 format!("pose actions are executed exactly{from}")
             });
+        }
+        if self.unused_targets > 0 {
+            words.push(format!(
+                "the {} poses of targets are not used: where joints and pixels were recorded, the pixels say more; leave out the \
+                 pixels to learn from targets",
+                self.unused_targets
+            ));
         }
         let unknown = self.starts.iter().filter(|start| start.is_none()).count();
         if unknown > 0 {

@@ -1,6 +1,7 @@
 //! A recording in memory.
 use crate::camera::CameraModel;
 use handeye_solvers::Pose;
+use nalgebra::Matrix6;
 
 /// What was commanded, read and seen while a robot moved. Units: m, rad, s, px.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -88,4 +89,7 @@ pub struct TargetDetection {
     pub target: String,
     /// `camera_from_target`.
     pub pose: Pose,
+    /// Covariance of the pose's error where the detector gives one: of the translation [m], then of the rotation vector [rad],
+    /// both along the camera's axes, as in ROS. Symmetric and positive definite.
+    pub covariance: Option<Matrix6<f64>>,
 }

@@ -202,6 +202,11 @@ fn every_mistake_in_a_recording_is_told_with_its_place_and_what_would_do() {
         (r#"{"pose":{"xyz":[0,0,0],"quat":@[0,0,0,0]}}"#, "a quaternion of length 0"),
         (r#"{"pose":@{"xyz":[0,0,0]}}"#, "this is not a pose"),
         (r#"{"targets":{"left":{"tag":{"xyz":[0,0,0],"quat":@[0,0,1]}}}}"#, "expected 4 numbers, found 3"),
+        (
+            r#"{"targets":{"left":{"tag":{"xyz":[0,0,0],"rpy":[0,0,0],"covariance":@[1,2]}}}}"#,
+            "expected 36 numbers, found 2",
+        ),
+        (r#"{"pose":{"xyz":[0,0,0],"rpy":[0,0,0],@"covariance":[1,2]}}"#, "unknown key `covariance`"),
         (r#"@[]"#, "expected a sample"),
         (r#"{"time":1} @{}"#, "trailing characters"),
         (r#"{"time":1,@}"#, "trailing comma"),

@@ -3,6 +3,7 @@ use crate::rig_files::{random_number, random_pose};
 use handeye::Error;
 use handeye::camera::CameraModel;
 use handeye::recording::*;
+use nalgebra::Matrix6;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::PathBuf;
@@ -61,7 +62,12 @@ fn random_recording(seed: u64) -> Recording {
             }
             for target in 0..random.random_range(0..3) {
                 let pose = random_pose(random);
-                sample.targets.push(TargetDetection { camera, target: format!("tag{target}"), pose });
+                let covariance = maybe(random, |r| {
+                    let factor = Matrix6::from_fn(|i, k| if i == k { 1.0 } else { r.random_range(-0.1..0.1) });
+                    let product: Matrix6<f64> = factor * factor.transpose();
+                    0.5 * (product + product.transpose())
+                });
+                sample.targets.push(TargetDetection { camera, target: format!("tag{target}"), pose, covariance });
             }
         }
         recording.samples.push(sample);

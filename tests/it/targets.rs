@@ -1,9 +1,9 @@
 //! Cameras and targets are learned from poses of targets, with the images' clock and the scale, and what is open is said.
 use handeye::calibrate::{Calibration, Options, calibrate};
 use handeye::recording::{RecordedCamera, Recording, Sample, TargetDetection};
-use handeye::rig::{Camera, Parent, PoseNoise, Rig};
+use handeye::rig::{Camera, Model, Parent, PoseNoise, Rig};
 use handeye::solvers::Pose;
-use nalgebra::Vector3;
+use nalgebra::{Matrix6, Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -55,7 +55,7 @@ impl World {
         seen.translation *= spoilt.scale.unwrap_or(1.0);
         let error = noise(random, spoilt.target);
         let seen = Pose { rotation: seen.rotation * error.rotation, translation: seen.translation + error.translation };
-        let targets = vec![TargetDetection { camera: 0, target: "tag".into(), pose: seen }];
+        let targets = vec![TargetDetection { camera: 0, target: "tag".into(), pose: seen, covariance: None }];
         Sample { pose: Some(tip * noise(random, spoilt.robot)), targets, ..Sample::default() }
     }
 
@@ -136,6 +136,101 @@ fn stated_noise_of_robot_and_targets_gives_honest_standard_deviations() {
     }
     // Coordinates are correlated, which widens the spread of the sum but not its mean.
     assert!((120.0..400.0).contains(&sum), "{sum}");
+}
+
+/// Medians over the seeds of the camera's error of place [m], with the covariances of detections passed on and without.
+fn with_and_without_covariances(seeds: u64) -> [f64; 2] {
+    let mut found: [Vec<f64>; 2] = Default::default();
+    for seed in 0..seeds {
+        let mut random = ChaCha8Rng::seed_from_u64(500 + seed);
+        let world = world(&mut random, seed % 2 == 0);
+        let mut samples: Vec<Sample> = Vec::new();
+        for k in 0..20 {
+            // Errors of place and rotation go together, along directions of each detection's own; some are far away.
+            let size = if k % 2 == 0 { 0.001 } else { 0.008 };
+            let mix = Matrix6::from_fn(|_, _| size * random.random_range(-1.0..1.0)) + Matrix6::identity() * 0.0002;
+            let tip = pose(&mut random, 1.0, 0.3);
+            let mut sample = world.sample(&mut random, tip, Spoilt::default());
+            let error = mix * Vector6::from_fn(|_, _| Distribution::<f64>::sample(&StandardNormal, &mut random));
+            let (step, turn) = (error.fixed_rows::<3>(0).into_owned(), error.fixed_rows::<3>(3).into_owned());
+            let seen = &mut sample.targets[0];
+            seen.pose.translation += step;
+            seen.pose.rotation = Pose::new(turn, Vector3::zeros()).rotation * seen.pose.rotation;
+            seen.covariance = Some(mix * mix.transpose());
+            samples.push(sample);
+        }
+        found[0].push(errors(&learn(&world.rig(), &recording(samples.clone())).rig, &world)[1]);
+        samples.iter_mut().for_each(|sample| sample.targets[0].covariance = None);
+        found[1].push(errors(&learn(&world.rig(), &recording(samples)).rig, &world)[1]);
+    }
+    found.map(|mut errors| {
+        errors.sort_by(f64::total_cmp);
+        errors[errors.len() / 2]
+    })
+}
+
+#[test]
+fn covariances_of_detections_weigh_them_direction_by_direction() {
+    let [with, without] = with_and_without_covariances(20);
+    assert!(with < 0.5 * without, "{with} m with covariances, {without} m without");
+}
+
+/// A UR5 with a camera on its hand, its nominal rows given.
+fn arm() -> Rig {
+    let mut rig = Rig::parse(include_str!("../../models/ur5.toml"), "ur5.toml").unwrap();
+    rig.cameras = vec![Camera { name: "camera".into(), parent: Parent::Tip, ..Camera::default() }];
+    rig.features.clear();
+    rig.targets.clear();
+    rig
+}
+
+// The target is predicted in new poses: chain and camera together, so that what one takes from the other does not count.
+#[test]
+fn a_chain_that_is_off_is_learned_and_one_that_is_right_is_left_alone() {
+    for (off, most) in [(0.003, 0.4), (0.0, 1.6)] {
+        let mut ratios = Vec::new();
+        for seed in 0..7 {
+            let mut random = ChaCha8Rng::seed_from_u64(900 + seed);
+            let world = world(&mut random, true);
+            let nominal = arm();
+            let mut built = nominal.clone();
+            for joint in &mut built.robot.joints {
+                let mut moved = |value: Option<f64>| value.map(|value| value + random.random_range(-off..=off));
+                (joint.offset, joint.d, joint.a, joint.alpha) =
+                    (moved(joint.offset), moved(joint.d), moved(joint.a), moved(joint.alpha));
+            }
+            let model = |rig: &Rig| Model::new(&Rig { robot: rig.robot.clone(), ..Rig::default() }).unwrap();
+            let truth = model(&built);
+            let spoilt = Spoilt { target: PoseNoise { xyz: 0.0005, rot: 0.001 }, ..Spoilt::default() };
+            let mut joints = || (0..6).map(|_| random.random_range(-1.5..1.5)).collect::<Vec<f64>>();
+            let (seen, new): (Vec<_>, Vec<_>) =
+                ((0..60).map(|_| joints()).collect(), (0..30).map(|_| joints()).collect());
+            let samples: Vec<Sample> = seen
+                .iter()
+                .map(|q| Sample {
+                    pose: None,
+                    joints: Some(q.clone()),
+                    ..world.sample(&mut random, truth.tip(q), spoilt)
+                })
+                .collect();
+            let recording = Recording { joints: (1..=6).map(|k| format!("j{k}")).collect(), ..recording(samples) };
+            let error = |rig: &Rig| {
+                let learned = learn(rig, &recording).rig;
+                let chain = model(&learned);
+                let (camera, target) = (learned.cameras[0].pose.unwrap(), learned.targets[0].pose.unwrap());
+                let off = |q: &Vec<f64>| {
+                    let found = (chain.tip(q) * camera).inverse() * target;
+                    (found.translation - world.seen(&truth.tip(q)).translation).norm_squared()
+                };
+                (new.iter().map(off).sum::<f64>() / new.len() as f64).sqrt()
+            };
+            let mut held = nominal.clone();
+            held.estimate.fixed = vec!["robot".into()];
+            ratios.push(error(&nominal) / error(&held));
+        }
+        ratios.sort_by(f64::total_cmp);
+        assert!(ratios[3] < most, "off by {off}: {ratios:?} of the error with the chain held");
+    }
 }
 
 #[test]

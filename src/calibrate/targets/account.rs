@@ -72,7 +72,10 @@ impl Account<'_> {
         let (mut used, mut sums, mut samples) = (0, [0.0; 2], vec![false; setup.moments.len()]);
         for (index, view) in setup.views.iter().enumerate() {
             let r = residual(setup, state, index);
-            let size = r.iter().zip(state.sigmas).map(|(r, sigma)| (r / sigma).powi(2)).sum::<f64>();
+            let size: f64 = match &view.whitening {
+                Some(rows) => rows.iter().map(|row| row.iter().zip(&r).map(|(w, r)| w * r).sum::<f64>().powi(2)).sum(),
+                None => r.iter().zip(state.sigmas).map(|(r, sigma)| (r / sigma).powi(2)).sum(),
+            };
             if size < 6.0 * WRONG * WRONG {
                 used += 1;
                 samples[view.moment] = true;
@@ -130,7 +133,15 @@ impl Account<'_> {
             (false, true) => "tips are free under the noise of their poses",
             (false, false) => "tips are where their poses say",
         };
-        let targets = if noise.target.is_some() { "stated" } else { "estimated from their scatter" };
+        let told = self.setup.views.iter().filter(|view| view.whitening.is_some()).count();
+        let targets = match (told, noise.target) {
+            (0, None) => "estimated from their scatter",
+            (0, Some(_)) => "stated",
+            (told, None) if told < self.setup.views.len() => {
+                "what their covariances say, and estimated from the scatter where they have none"
+            }
+            _ => "what their covariances say",
+        };
         format!("{tips}{clock}; the noise of targets is {targets}")
     }
 

@@ -22,6 +22,8 @@ pub(super) struct State {
     pub scale: f64,
     /// Standard deviations of a target's pose in its camera: rotation [rad], then translation [m].
     pub sigmas: [f64; 6],
+    /// How far the chain's given values are off [rad, m], where the rig does not say.
+    pub spread: [f64; 2],
 }
 
 /// Which scalars are free besides the poses.
@@ -46,9 +48,7 @@ pub(super) struct Built {
 const NEAR_TIP: f64 = 0.3;
 const NEAR_ORIGIN: f64 = 10.0;
 
-/// So far off a given value may be where nothing is said of how well it is known [rad, m].
-const ANGLE: f64 = 0.02;
-const LENGTH: f64 = 0.01;
+/// So far off a given pose may be where nothing is said of how well it is known [rad, m].
 const GIVEN_ANGLE: f64 = 0.1;
 const GIVEN_LENGTH: f64 = 0.1;
 
@@ -80,7 +80,11 @@ pub(super) fn build(setup: &Setup, state: &State, freedom: Freedom, loss: Loss) 
         let carrier = |parent: Parent| if parent == Parent::World { world } else { tips[view.moment] };
         let (mount, carrier) = (carrier(rig.cameras[view.camera].parent), carrier(rig.targets[view.target].parent));
         let on = (carrier, targets[view.target], mount, cameras[view.camera], scale);
-        graph.factor(TargetSeen { seen: view.seen }, on).sigmas(state.sigmas).loss(loss);
+        let factor = graph.factor(TargetSeen { seen: view.seen }, on).loss(loss);
+        match view.whitening {
+            Some(whitening) => factor.whitening(whitening),
+            None => factor.sigmas(state.sigmas),
+        };
     }
     Built { graph, cameras, targets, parameters, tips, offset, scale }
 }
@@ -96,7 +100,7 @@ fn tips(
     if let Some(model) = chain_of(&setup.rig).filter(|_| setup.by_joints) {
         let base = graph.held(state.base);
         let parameters = graph.free(DynamicVector::from_column_slice(&state.parameters));
-        let (held, sigmas) = known_parameters(setup);
+        let (held, sigmas) = known_parameters(setup, state.spread);
         graph.hold_coordinates(parameters, &held);
         graph.prior(parameters, &DynamicVector::from_column_slice(&model.parameters), &sigmas);
         let chain = Arc::new(model.chain.clone());
@@ -150,7 +154,7 @@ fn prior(graph: &mut Graph, setup: &Setup, key: Key<Pose>, parameter: Parameter,
 }
 
 /// Coordinates of the chain's parameters that are held, and standard deviations of all.
-fn known_parameters(setup: &Setup) -> (Vec<usize>, Vec<f64>) {
+fn known_parameters(setup: &Setup, [angle, length]: [f64; 2]) -> (Vec<usize>, Vec<f64>) {
     let rig = &setup.rig;
     let (mut held, mut sigmas) = (Vec::new(), Vec::new());
     for (joint, row) in rig.robot.joints.iter().enumerate() {
@@ -160,7 +164,7 @@ fn known_parameters(setup: &Setup) -> (Vec<usize>, Vec<f64>) {
             if rig.is_fixed(&parameter) || (field == JointField::Beta && row.beta.is_none()) {
                 held.push(LINK_PARAMETERS * joint + k);
             }
-            sigmas.push(rig.prior_sd(&parameter).unwrap_or(if is_length { LENGTH } else { ANGLE }));
+            sigmas.push(rig.prior_sd(&parameter).unwrap_or(if is_length { length } else { angle }));
         }
     }
     (held, sigmas)

@@ -7,6 +7,7 @@ mod clock;
 mod graph;
 mod moments;
 mod setup;
+mod spread;
 mod start;
 
 pub use account::{Disagreement, TargetReport};
@@ -29,6 +30,8 @@ const TAILS: f64 = 4.0;
 
 /// Rounds in which the noise is estimated from the scatter, and streams are smoothed where the clock now puts them.
 const ROUNDS: usize = 4;
+/// The same where how far the chain is off is estimated too.
+const CHAIN_ROUNDS: usize = 10;
 
 /// Where nothing is said of the noise, this is where its estimation starts [rad, m].
 const ROT: f64 = 0.005;
@@ -112,7 +115,8 @@ impl Fitted {
         let freedom = Freedom { offset: setup.apart, scale: state.scale != 1.0 };
         let (mut iterations, mut first_cost) = (0, 0.0);
         let mut last = None;
-        for round in 0..ROUNDS {
+        let rounds = if setup.by_joints { CHAIN_ROUNDS } else { ROUNDS };
+        for round in 0..rounds {
             if setup.rig.noise.target.is_none() {
                 state.sigmas = scatter(&setup, &state);
             }
@@ -123,6 +127,7 @@ impl Fitted {
             let mut built = build(&setup, &state, freedom, Loss::Cauchy(TAILS));
             let (report, solver) = built.minimize(&mut state)?;
             iterations += report.iterations;
+            spread::estimate(&setup, &built, &mut state);
             if round == 0 {
                 first_cost = report.initial_cost;
             }
@@ -226,6 +231,7 @@ fn first_state(setup: &Setup, start: &Start, offset: f64) -> State {
         offset,
         scale: start.scale,
         sigmas: [rot, rot, rot, xyz, xyz, xyz],
+        spread: spread::FIRST,
     }
 }
 

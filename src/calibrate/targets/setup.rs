@@ -1,9 +1,10 @@
 //! What is known and what was measured, side by side: who carries what, and what the robot read when a target was seen.
 use super::moments::{Moment, Stream};
 use crate::Error;
-use crate::recording::Recording;
+use crate::recording::{Recording, TargetDetection};
 use crate::rig::{Camera, Parent, Rig, Target};
 use handeye_solvers::Pose;
+use nalgebra::{Matrix3, Matrix6};
 
 /// A calibration from targets before anything is estimated.
 pub(super) struct Setup {
@@ -27,6 +28,19 @@ pub(super) struct View {
     pub target: usize,
     /// `camera_from_target` as reported.
     pub seen: Pose,
+    /// What whitens its residual, where the detector says how good it is.
+    pub whitening: Option<[[f64; 6]; 6]>,
+}
+
+/// W with WᵀW the inverse covariance of [`TargetSeen`](crate::factors::TargetSeen)'s residual, from that of a reported pose.
+fn whitening(detection: &TargetDetection) -> Option<[[f64; 6]; 6]> {
+    // The residual turns in the target's frame, and has the rotation first.
+    let mut to_residual = Matrix6::zeros();
+    to_residual.fixed_view_mut::<3, 3>(0, 3).copy_from(&detection.pose.rotation.transpose());
+    to_residual.fixed_view_mut::<3, 3>(3, 0).copy_from(&Matrix3::identity());
+    let covariance = to_residual * detection.covariance? * to_residual.transpose();
+    let inverse = covariance.cholesky()?.l().try_inverse()?;
+    Some(std::array::from_fn(|row| std::array::from_fn(|column| inverse[(row, column)])))
 }
 
 impl Setup {
@@ -46,7 +60,13 @@ impl Setup {
             for detection in &sample.targets {
                 let camera = camera_index(&mut rig, recording, detection.camera as usize);
                 let target = target_index(&mut rig, &detection.target, camera);
-                setup.views.push(View { moment: setup.moments.len(), camera, target, seen: detection.pose });
+                setup.views.push(View {
+                    moment: setup.moments.len(),
+                    camera,
+                    target,
+                    seen: detection.pose,
+                    whitening: whitening(detection),
+                });
             }
             setup.moments.push(moment);
         }

@@ -2,20 +2,55 @@
 use super::entries::{Entries, Keys, Numbers, Object};
 use crate::rig::rotations;
 use handeye_solvers::Pose;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Matrix6, Vector3};
 use serde::de::MapAccess;
 
 /// Reads the pose that is the next value.
 pub(super) fn read_pose<'de, A: MapAccess<'de>>(map: &mut A) -> Result<Pose, A::Error> {
-    let mut entries = PoseEntries { keys: Keys::new(&["xyz", "quat", "rpy"]), xyz: [0.0; 3], rotation: None };
+    let mut entries = PoseEntries::new(&["xyz", "quat", "rpy"]);
     map.next_value_seed(Object(&mut entries))?;
-    Ok(Pose { rotation: entries.rotation.unwrap_or_else(Matrix3::identity), translation: Vector3::from(entries.xyz) })
+    Ok(entries.pose())
+}
+
+/// The same with the covariance of its error, where that is given: 36 numbers by rows.
+pub(super) fn read_noisy_pose<'de, A: MapAccess<'de>>(map: &mut A) -> Result<(Pose, Option<Matrix6<f64>>), A::Error> {
+    let mut entries = PoseEntries::new(&["xyz", "quat", "rpy", "covariance"]);
+    map.next_value_seed(Object(&mut entries))?;
+    Ok((entries.pose(), entries.covariance))
 }
 
 struct PoseEntries {
     keys: Keys,
     xyz: [f64; 3],
     rotation: Option<Matrix3<f64>>,
+    covariance: Option<Matrix6<f64>>,
+}
+
+impl PoseEntries {
+    fn new(known: &'static [&'static str]) -> Self {
+        PoseEntries { keys: Keys::new(known), xyz: [0.0; 3], rotation: None, covariance: None }
+    }
+
+    fn pose(&self) -> Pose {
+        Pose { rotation: self.rotation.unwrap_or_else(Matrix3::identity), translation: Vector3::from(self.xyz) }
+    }
+}
+
+/// Differences this large between the two halves are no rounding.
+const ASYMMETRIC: f64 = 1e-6;
+
+fn covariance(rows: [f64; 36]) -> Result<Option<Matrix6<f64>>, String> {
+    let given = Matrix6::from_row_slice(&rows);
+    if (given - given.transpose()).amax() > ASYMMETRIC * given.amax() {
+        return Err(
+            "a covariance is symmetric (36 numbers by rows: x, y, z, then the rotation about x, y, z)".to_owned()
+        );
+    }
+    let symmetric = 0.5 * (given + given.transpose());
+    match symmetric.cholesky() {
+        Some(_) => Ok(Some(symmetric)),
+        None => Err("a covariance is positive definite; one that is not known is left out".to_owned()),
+    }
 }
 
 impl Entries for PoseEntries {
@@ -24,7 +59,7 @@ impl Entries for PoseEntries {
 
     fn key(&mut self, name: &str) -> Result<&'static str, String> {
         let key = self.keys.meet(name)?;
-        if key != "xyz" && self.rotation.is_some() {
+        if matches!(key, "quat" | "rpy") && self.rotation.is_some() {
             return Err("the rotation is given twice: `quat` or `rpy`, not both".to_owned());
         }
         Ok(key)
@@ -33,6 +68,7 @@ impl Entries for PoseEntries {
     fn value<'de, A: MapAccess<'de>>(&mut self, key: &'static str, map: &mut A) -> Result<(), A::Error> {
         match key {
             "xyz" => self.xyz = map.next_value_seed(Numbers(Ok))?,
+            "covariance" => self.covariance = map.next_value_seed(Numbers(covariance))?,
             "rpy" => self.rotation = map.next_value_seed(Numbers(|rpy| Ok(Some(rotations::from_rpy(rpy)))))?,
             _ => {
                 self.rotation = map.next_value_seed(Numbers(|quat| {

@@ -1,11 +1,12 @@
 //! A line of a recording: one sample.
 use super::entries::{Entries, Keys, List, Number, Numbers, Object};
-use super::pose::read_pose;
+use super::pose::{read_noisy_pose, read_pose};
 use crate::error::suggestion;
 use crate::recording::names::{Names, natural_order};
 use crate::recording::{Detection, PointDetection, RecordedCamera, Sample, TargetDetection};
 use crate::rig::problem_of_name;
 use handeye_solvers::Pose;
+use nalgebra::Matrix6;
 use serde::de::MapAccess;
 use std::collections::BTreeSet;
 
@@ -64,9 +65,9 @@ impl Entries for SampleEntries<'_> {
                     ByCamera { cameras: self.cameras, names: &mut targets, met: BTreeSet::new(), found: vec![] };
                 map.next_value_seed(Object(&mut seen))?;
                 let found = seen.found;
-                let detection = |(camera, target, pose): (u32, u32, Pose)| {
+                let detection = |(camera, target, (pose, covariance)): (u32, u32, (Pose, Option<Matrix6<f64>>))| {
                     let target = targets.list[target as usize].clone();
-                    TargetDetection { camera, target, pose }
+                    TargetDetection { camera, target, pose, covariance }
                 };
                 self.sample.targets = found.into_iter().map(detection).collect();
                 self.sample
@@ -157,8 +158,8 @@ impl<const N: usize> Leaf for [f64; N] {
     }
 }
 
-impl Leaf for Pose {
+impl Leaf for (Pose, Option<Matrix6<f64>>) {
     fn read<'de, A: MapAccess<'de>>(map: &mut A) -> Result<Self, A::Error> {
-        read_pose(map)
+        read_noisy_pose(map)
     }
 }

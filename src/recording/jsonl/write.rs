@@ -4,6 +4,7 @@ use crate::Error;
 use crate::recording::{RecordedCamera, Recording, Sample};
 use crate::rig::{replace_file, rotations};
 use handeye_solvers::Pose;
+use nalgebra::Matrix6;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -73,7 +74,7 @@ impl Recording {
         })?;
         let targets: Vec<_> = sample.targets.iter().map(|d| (d.camera, d)).collect();
         by_camera(&mut object, "targets", &targets, camera, |table, detection| {
-            write_pose(table.member(&detection.target)?, &detection.pose)
+            write_pose_with(table.member(&detection.target)?, &detection.pose, detection.covariance.as_ref())
         })?;
         object.end();
         line.push('\n');
@@ -152,9 +153,17 @@ impl<'a> Members<'a> {
 }
 
 fn write_pose(line: &mut String, pose: &Pose) -> io::Result<()> {
+    write_pose_with(line, pose, None)
+}
+
+fn write_pose_with(line: &mut String, pose: &Pose, covariance: Option<&Matrix6<f64>>) -> io::Result<()> {
     let mut object = Members::begin(line);
     numbers(object.member("xyz")?, pose.translation.as_slice())?;
     numbers(object.member("quat")?, &rotations::to_quaternion(&pose.rotation))?;
+    if let Some(covariance) = covariance {
+        // Symmetric, so that columns are rows.
+        numbers(object.member("covariance")?, covariance.as_slice())?;
+    }
     object.end();
     Ok(())
 }
