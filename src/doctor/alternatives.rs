@@ -27,6 +27,10 @@ pub(super) fn all(rig: &Rig, recording: &Recording) -> Vec<Alternative> {
     } else {
         for (name, change, undo) in undo::OF_POSES.into_iter().take(2) {
             let mut alternative = as_recorded(&format!("robot poses are {name}"), change);
+            if name == "inverted" {
+                // Pixels alone do not tell the two apart.
+                alternative.change += ", or, if they are right, exchange the parents of cameras and features";
+            }
             let poses = alternative.recording.samples.iter_mut().filter_map(|sample| sample.pose.as_mut());
             poses.for_each(|pose| *pose = undo(pose));
             all.push(alternative);
@@ -55,7 +59,8 @@ fn units(rig: &Rig, as_recorded: impl Fn(&str, &str) -> Alternative) -> Vec<Alte
     let degrees = as_recorded("joints are in degrees", "divide the readings of revolute joints by 57.2958");
     let mut all = vec![scaled(degrees, JointKind::Revolute, 1f64.to_radians())];
     if rig.robot.joints.iter().any(|joint| joint.kind == JointKind::Prismatic) {
-        let lengths = as_recorded("prismatic joints are in millimetres", "divide the readings of prismatic joints by 1000");
+        let lengths =
+            as_recorded("prismatic joints are in millimetres", "divide the readings of prismatic joints by 1000");
         all.push(scaled(lengths, JointKind::Prismatic, 1e-3));
     }
     all

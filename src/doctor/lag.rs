@@ -31,7 +31,9 @@ pub(super) fn find(rig: &Rig, recording: &Recording, options: &Options) -> Optio
             evaluate(&learned.rig, &shifted).map_or(f64::INFINITY, |judged| judged.total.median_px)
         };
         let most = (PERIODS / STEP).round() as i32;
-        let best = (-most..=most).map(|k| (misfit(k), k)).min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.abs().cmp(&b.1.abs())))?;
+        let best = (-most..=most)
+            .map(|k| (misfit(k), k))
+            .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.abs().cmp(&b.1.abs())))?;
         let seconds = f64::from(best.1) * STEP * period;
         let settled = seconds == lag.seconds;
         lag = Lag { seconds, recording: interpolated(recording, seconds) };

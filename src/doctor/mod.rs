@@ -71,7 +71,8 @@ pub struct Diagnosis {
 pub fn examine(rig: &Rig, recording: &Recording, options: &calibrate::Options) -> Diagnosis {
     let tips = tips(rig, recording, f64::to_owned);
     let mut diagnosis = Diagnosis { findings: data::findings(rig, recording, &tips), ..Diagnosis::default() };
-    let turns_freely = !diagnosis.findings.iter().any(|finding| finding.what.contains("turn") || finding.what.contains("one axis"));
+    let turns_freely =
+        !diagnosis.findings.iter().any(|finding| finding.what.contains("turn") || finding.what.contains("one axis"));
     if let Some(pairs) = poses::Pairs::new(rig, recording, &tips).filter(|_| turns_freely) {
         let has_poses = recording.samples.iter().any(|sample| sample.pose.is_some());
         let in_degrees = (!has_poses).then(|| self::tips(rig, recording, |reading| reading.to_radians()));

@@ -59,7 +59,8 @@ pub(super) fn examine(rig: &Rig, recording: &Recording, options: &calibrate::Opt
     }
     let explained = NOISE * rig.noise.pixels;
     let is_explained = as_recorded.is_some_and(|misfit| misfit.size() <= explained);
-    if best.is_none() && !is_explained {
+    let is_fine = best.as_ref().is_some_and(|(misfit, _)| misfit.size() <= explained);
+    if !is_fine && !is_explained {
         for alternative in alternatives::all(rig, recording) {
             let misfit = score(&alternative.rig, &alternative.recording, options);
             consider(alternative, misfit, as_recorded, &mut best, diagnosis);
@@ -73,7 +74,8 @@ pub(super) fn examine(rig: &Rig, recording: &Recording, options: &calibrate::Opt
             let (by, side) = (lag.seconds.abs(), if lag.seconds > 0.0 { "late" } else { "early" });
             let name = format!("joints are stamped {by:.3} s too {side}");
             let sign = if lag.seconds > 0.0 { "subtract" } else { "add" };
-            let change = format!("{sign} {by:.3} s {} the stamps of the joints", if sign == "add" { "to" } else { "from" });
+            let change =
+                format!("{sign} {by:.3} s {} the stamps of the joints", if sign == "add" { "to" } else { "from" });
             diagnosis.scores.push(Score { alternative: name.clone(), misfit });
             let beaten = best.as_ref().map(|(best, _)| FINER * best.size());
             if let Some(misfit) = misfit.filter(|_| is_clearly_better(misfit, as_recorded))

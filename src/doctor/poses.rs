@@ -110,7 +110,11 @@ impl Pairs {
         }
     }
 
-    fn alternatives(&self, in_degrees: Option<&[Option<Pose>]>, reading: &impl Fn(&str, &str) -> Reading) -> Vec<Reading> {
+    fn alternatives(
+        &self,
+        in_degrees: Option<&[Option<Pose>]>,
+        reading: &impl Fn(&str, &str) -> Reading,
+    ) -> Vec<Reading> {
         let mut all = Vec::new();
         for (name, change, undo) in undo::OF_POSES {
             let robot = self.robot.iter().map(undo).collect();
@@ -122,7 +126,10 @@ impl Pairs {
         }
         if let Some(tips) = in_degrees {
             let robot = self.samples.iter().map(|sample| tips[*sample].unwrap_or_else(Pose::identity)).collect();
-            all.push(Reading { robot, ..reading("joints are in degrees", "divide the readings of revolute joints by 57.2958") });
+            all.push(Reading {
+                robot,
+                ..reading("joints are in degrees", "divide the readings of revolute joints by 57.2958")
+            });
         }
         for (name, change, rows) in undo::pairings("robot poses", self.samples.len()) {
             let of = |poses: &[Pose], index: &dyn Fn(usize) -> Option<usize>| -> Vec<Pose> {
@@ -163,7 +170,8 @@ impl Pairs {
     /// Two samples, each of whose robot poses fits the other's image.
     fn swapped(&self, fit: &Fit) -> Vec<Finding> {
         let limit = WRONG * fit.misfit.size();
-        let wrong: Vec<usize> = (0..self.samples.len()).filter(|i| fit.each[*i].size() > limit).take(MOST_SWAPPED).collect();
+        let wrong: Vec<usize> =
+            (0..self.samples.len()).filter(|i| fit.each[*i].size() > limit).take(MOST_SWAPPED).collect();
         let misfit = |row: usize, image: usize| {
             misfit(&fit.x, &fit.z, &self.robot[row], &seen(&self.target[image], self.on_hand)).size()
         };
@@ -172,7 +180,10 @@ impl Pairs {
             for &j in &wrong[k + 1..] {
                 if misfit(i, j) < EXPLAINED * misfit(i, i) && misfit(j, i) < EXPLAINED * misfit(j, j) {
                     findings.push(Finding {
-                        what: format!("the robot poses of samples {} and {} are swapped", self.samples[i], self.samples[j]),
+                        what: format!(
+                            "the robot poses of samples {} and {} are swapped",
+                            self.samples[i], self.samples[j]
+                        ),
                         change: "exchange the robot poses of the two samples".into(),
                     });
                 }

@@ -3,8 +3,11 @@ use crate::recording::{Recording, Sample};
 use handeye_solvers::Pose;
 use handeye_solvers::manifold::so3;
 
-/// What may be wrong with poses: how it is called, what to change, and the change.
-pub(super) const OF_POSES: [(&str, &str, fn(&Pose) -> Pose); 3] = [
+/// A mistake of poses: how it is called, what to change, and the change.
+type OfPoses = (&'static str, &'static str, fn(&Pose) -> Pose);
+
+/// What may be wrong with poses.
+pub(super) const OF_POSES: [OfPoses; 3] = [
     ("inverted", "write the inverse of each", Pose::inverse),
     ("quaternions in the order w, x, y, z", "write quaternions as [x, y, z, w]", reorder),
     ("in millimetres", "divide their positions by 1000", metres),
@@ -20,8 +23,11 @@ fn metres(pose: &Pose) -> Pose {
     Pose { translation: pose.translation / 1000.0, ..*pose }
 }
 
-/// How rows may be paired with images: how it is called, what to change, and for each of n samples the row that belongs to it.
-pub(super) fn pairings(what: &str, n: usize) -> Vec<(String, String, Vec<Option<usize>>)> {
+/// How rows may be paired with images: how it is called, what to change, and for each sample the row that belongs to it.
+type Pairing = (String, String, Vec<Option<usize>>);
+
+/// The ways in which n rows may be paired.
+pub(super) fn pairings(what: &str, n: usize) -> Vec<Pairing> {
     let mut all: Vec<_> = [1, -1, 2, -2, 3, -3]
         .into_iter()
         .map(|shift: isize| {
@@ -30,7 +36,8 @@ pub(super) fn pairings(what: &str, n: usize) -> Vec<(String, String, Vec<Option<
                 1 => "one sample".to_owned(),
                 _ => format!("{by} samples"),
             };
-            let change = format!("pair each image with the {what} {by} {}", if shift < 0 { "later" } else { "earlier" });
+            let change =
+                format!("pair each image with the {what} {by} {}", if shift < 0 { "later" } else { "earlier" });
             let rows = (0..n).map(|i| i.checked_add_signed(-shift).filter(|row| *row < n)).collect();
             (format!("{what} are {by} {side}"), change, rows)
         })
