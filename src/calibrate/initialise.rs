@@ -3,6 +3,7 @@ use super::anchor::Anchor;
 use super::evaluate::median;
 use super::graph::State;
 use super::kinematics::{find_axes, find_lines, rows};
+use super::known::known_parts;
 use super::look::look;
 use super::motion::from_motion;
 use super::outliers::distances;
@@ -30,6 +31,12 @@ const WIDTH: f64 = 20.0;
 /// chain does.
 pub(crate) fn initialise(seed: u64, stages: &mut Stages<'_>) -> Result<State, Error> {
     let setup = stages.setup;
+    if let Some((state, cameras, features)) = known_parts(setup)
+        && let Ok(first) = complete(state, 0.0, &cameras, &features, seed, stages)
+        && first.error < EXPLAINED
+    {
+        return Ok(first.state);
+    }
     let (explanations, mut failure) = match look(seed, stages) {
         Ok(explanations) => (explanations, None),
         Err(Error::NotEnoughData(reason)) if setup.motion_is_known() => {

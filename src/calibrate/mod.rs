@@ -8,11 +8,13 @@ mod graph;
 mod initialise;
 mod join;
 mod kinematics;
+mod known;
 mod look;
 mod motion;
 mod outliers;
 mod priors;
 mod readings;
+mod relearn;
 mod report;
 mod robust;
 mod selection;
@@ -27,13 +29,14 @@ mod variances;
 mod visual;
 
 pub use evaluate::{CameraErrors, Errors, Evaluation, evaluate};
+pub use relearn::relearn;
 pub use report::{Calibration, Finding, Report, StageReport, TipDeviation};
 pub use selection::{NoiseTrial, select_noise};
 pub use targets::{Disagreement, TargetReport};
 
 use crate::Error;
 use crate::recording::Recording;
-use crate::rig::{Noise, Rig};
+use crate::rig::{Noise, Parameter, Rig};
 use deviations::deviations;
 use finish::finish;
 use graph::{Priors, State};
@@ -196,6 +199,7 @@ const TAILS: f64 = 5.0;
 fn is_complete(setup: &Setup) -> bool {
     let rig = &setup.rig;
     setup.chain_is_known()
+        && (rig.robot.base.is_some() || !gauge::world_is_known(setup) || rig.is_fixed(&Parameter::Base))
         && rig.cameras.iter().all(|camera| camera.pose.is_some())
         && rig.features.iter().all(|feature| feature.xyz.is_some())
 }

@@ -9,7 +9,8 @@ use super::words::{cameras_json, count, duration, error_table};
 use clap::Args;
 use handeye::Error;
 use handeye::calibrate::{
-    Calibration, Errors, Finding, NoiseTrial, Options, Report, TargetReport, TipDeviation, calibrate, select_noise,
+    Calibration, Errors, Finding, NoiseTrial, Options, Progress, Report, TargetReport, TipDeviation, calibrate,
+    relearn, select_noise,
 };
 use handeye::rig::Rig;
 use serde_json::{Value, json};
@@ -25,7 +26,8 @@ Examples:
   handeye calibrate motions.jsonl -o learned.toml
   handeye calibrate monday.jsonl tuesday.jsonl --rig arm.toml -o learned.toml
   handeye calibrate motions.jsonl --rig ur5 -o learned.toml --folds 5   with held-out errors
-  handeye calibrate motions.jsonl --rig arm.toml -o arm.toml            keeps its comments")]
+  handeye calibrate motions.jsonl --rig arm.toml -o arm.toml            keeps its comments
+  handeye calibrate three.jsonl --rig arm.toml --relearn cameras.left -o arm.toml   a camera that was moved")]
 pub struct Calibrate {
     /// Recordings of one rig
     #[arg(value_name = "REC", required = true)]
@@ -39,6 +41,9 @@ pub struct Calibrate {
     /// Also learn K times without every K-th sample, and report how well those are predicted
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(2..))]
     folds: Option<u32>,
+    /// Learn these parameters anew from few samples and hold everything else: cameras.left, features, robot.base, with *
+    #[arg(long, value_name = "PATH", requires = "rig", conflicts_with_all = ["select_noise", "folds"])]
+    relearn: Vec<String>,
     /// Estimate the noise of pixels, joints, poses and actions from the data; [noise] of the rig is where that starts
     #[arg(long)]
     estimate_noise: bool,
@@ -69,7 +74,12 @@ impl Calibrate {
             }
             let folds = self.folds.map(|n| Folds::new(&rig, &recording, n as usize, &options, &bar)).transpose()?;
             let start = std::time::Instant::now();
-            let calibration = calibrate(&rig, &recording, &options, &mut |progress| bar.show("", progress))?;
+            let mut show = |progress: &Progress<'_>| bar.show("", progress);
+            let calibration = if self.relearn.is_empty() {
+                calibrate(&rig, &recording, &options, &mut show)?
+            } else {
+                relearn(&rig, &recording, &self.relearn, &options, &mut show)?
+            };
             Ok((trials, folds, calibration, start.elapsed().as_secs_f64()))
         })?;
         drop(bar);

@@ -12,6 +12,7 @@ mod malformed_input;
 mod not_enough;
 mod readme;
 mod recording_files;
+mod relearn;
 mod rig_files;
 mod simulate;
 mod states;

@@ -1,0 +1,79 @@
+//! A first state from what is known of the rig already: known cameras and features place the rest, however few the samples.
+use super::evaluate::median;
+use super::graph::State;
+use super::setup::{Observation, Setup};
+use crate::geometry::resect;
+use crate::rig::{Parameter, Parent};
+use handeye_solvers::Pose;
+use std::collections::BTreeMap;
+
+/// Known features in one image from which the base is placed, at least.
+const IN_IMAGE: usize = 4;
+
+/// The state where everything known is, and which cameras and features are. `None` where none is, or the motion of the tip
+/// is not known.
+pub(super) fn known_parts(setup: &Setup) -> Option<(State, Vec<bool>, Vec<bool>)> {
+    let rig = &setup.rig;
+    let cameras: Vec<bool> = rig.cameras.iter().map(|camera| camera.pose.is_some()).collect();
+    let features: Vec<bool> = rig.features.iter().map(|feature| feature.xyz.is_some()).collect();
+    if !setup.motion_is_known() || !(cameras.contains(&true) || features.contains(&true)) {
+        return None;
+    }
+    let mut state = State::new(setup);
+    if setup.states.chain && rig.robot.base.is_none() && !rig.is_fixed(&Parameter::Base) {
+        place_base(setup, &mut state, &cameras, &features);
+    }
+    Some((state, cameras, features))
+}
+
+/// Puts the base where known cameras see known features: the candidate of all images that explains most of them.
+fn place_base(setup: &Setup, state: &mut State, cameras: &[bool], features: &[bool]) {
+    let mut images: BTreeMap<(usize, usize), Vec<&Observation>> = BTreeMap::new();
+    for seen in setup.observations.iter().filter(|seen| cameras[seen.camera] && features[seen.feature]) {
+        if state.placed[seen.sample] && is_across(setup, seen) {
+            images.entry((seen.sample, seen.camera)).or_default().push(seen);
+        }
+    }
+    let all: Vec<&Observation> = images.values().flatten().copied().collect();
+    let candidates = images.iter().filter(|(_, seen)| seen.len() >= IN_IMAGE).flat_map(|(&(sample, camera), seen)| {
+        let tip_from_base = state.model.tip(&state.joints[sample]).inverse();
+        world_from_tip(setup, camera, seen).into_iter().map(move |tip| tip * tip_from_base)
+    });
+    let usual_error = |base: &Pose| {
+        let mut moved = state.clone();
+        moved.model.base = *base;
+        let links = moved.all_links(setup);
+        let distance = |seen: &&Observation| {
+            let [u, v] = moved.model.pixel(seen.camera, seen.feature, &links[seen.sample]);
+            (u - seen.pixel[0]).hypot(v - seen.pixel[1])
+        };
+        median(&mut all.iter().map(distance).collect::<Vec<_>>())
+    };
+    let best = candidates.map(|base| (usual_error(&base), base)).min_by(|a, b| a.0.total_cmp(&b.0));
+    if let Some((_, base)) = best {
+        state.model.base = base;
+    }
+}
+
+/// A camera in the world that sees a feature on the tip, or the other way round.
+fn is_across(setup: &Setup, seen: &Observation) -> bool {
+    let parents = (setup.model.cameras[seen.camera].parent, setup.model.features[seen.feature].parent);
+    matches!(parents, (Parent::World, Parent::Tip) | (Parent::Tip, Parent::World))
+}
+
+/// Where the tip may be, by one image.
+fn world_from_tip(setup: &Setup, camera: usize, seen: &[&Observation]) -> Vec<Pose> {
+    let camera = &setup.model.cameras[camera];
+    let ray = |seen: &&Observation| {
+        let bearing = camera.model.unproject(&camera.intrinsics, seen.pixel)?;
+        Some((setup.model.features[seen.feature].xyz, bearing))
+    };
+    let (points, bearings): (Vec<_>, Vec<_>) = seen.iter().filter_map(ray).unzip();
+    let found = resect(&points, &bearings).into_iter();
+    match camera.parent {
+        // camera_from_tip
+        Parent::World => found.map(|pose| camera.pose * pose).collect(),
+        // camera_from_world
+        _ => found.map(|pose| (camera.pose * pose).inverse()).collect(),
+    }
+}

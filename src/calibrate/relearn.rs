@@ -1,0 +1,126 @@
+//! A part of a learned rig learned anew from few samples, with everything else held: a camera that was moved or added, another
+//! object in the gripper, another place of the base.
+use super::{Calibration, Observer, Options, calibrate};
+use crate::Error;
+use crate::recording::Recording;
+use crate::rig::{Model, Parameter, Rig, matches};
+
+/// Learns the parameters that match any of `paths` (globs as in the rig file) from `recording`, from no start: their old values
+/// are forgotten. Everything else is held, and stays as it is to the last bit. Cameras and features of the recording that the rig
+/// does not know are learned too.
+///
+/// Intrinsics of a camera that is relearned start at what the recording's header says of it, else at the old ones, and are known
+/// as roughly as those of a new camera. Relearning all of `robot.joints` takes the features on the arm along: a chain has no
+/// room for given frames at both its ends. Relearning a part of the chain starts at the old values.
+///
+/// Errors: those of [`calibrate()`], and [`Error::Unusable`] where a path names nothing, or the rest of the rig is not complete.
+pub fn relearn(
+    rig: &Rig,
+    recording: &Recording,
+    paths: &[String],
+    options: &Options,
+    observer: Observer<'_>,
+) -> Result<Calibration, Error> {
+    check_paths(rig, paths)?;
+    let mut free: Vec<String> = paths.to_vec();
+    if rig.robot.joints.iter().all(|joint| is_free(&free, &format!("robot.joints.{}", joint.name))) {
+        free.extend(["features".to_owned(), "robot.base".to_owned()]);
+    }
+    let mut part = rig.clone();
+    part.fit = None;
+    part.estimate.prior.clear();
+    forget(&mut part, recording, &free);
+    let everything = part.parameters();
+    let held =
+        everything.iter().filter(|parameter| part.has_value(parameter) && !is_free(&free, &parameter.path(&part)));
+    part.estimate.fixed = held.map(|parameter| parameter.path(&part)).collect();
+    if part.robot.base.is_none() && !is_free(&free, "robot.base") {
+        part.estimate.fixed.push("robot.base".to_owned());
+    }
+    check_rest(rig, &part, &free)?;
+    let mut learned = calibrate(&part, recording, options, observer)?;
+    learned.rig.estimate.clone_from(&rig.estimate);
+    restore(&mut learned.rig, rig, &free);
+    Ok(learned)
+}
+
+/// Held values as they were written, which the way through rotations may have changed in the last bit.
+fn restore(learned: &mut Rig, rig: &Rig, free: &[String]) {
+    let held = |path: String| !is_free(free, &path);
+    if held("robot.base".to_owned()) {
+        learned.robot.base = rig.robot.base;
+    }
+    for (learned, camera) in learned.cameras.iter_mut().zip(&rig.cameras) {
+        if held(format!("cameras.{}.pose", camera.name)) {
+            learned.pose = camera.pose.or(learned.pose);
+        }
+    }
+}
+
+/// True where a parameter, or everything below it, is learned anew.
+fn is_free(paths: &[String], path: &str) -> bool {
+    paths.iter().any(|pattern| matches(pattern, path))
+}
+
+/// Every path must name something that the rig has.
+fn check_paths(rig: &Rig, paths: &[String]) -> Result<(), Error> {
+    let all: Vec<String> = rig.parameters().iter().map(|parameter| parameter.path(rig)).collect();
+    for path in paths {
+        if path != "robot.base" && !all.iter().any(|known| matches(path, known)) {
+            return Err(Error::Unusable(format!(
+                "--relearn `{path}` names nothing in the rig: a path is such as `cameras.left`, `features`, `robot.base` or \
+                 `robot.joints.*.offset`"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Takes out the values that are learned anew.
+fn forget(rig: &mut Rig, recording: &Recording, free: &[String]) {
+    let old = rig.clone();
+    let chain = old.robot.joints.iter().all(|joint| is_free(free, &format!("robot.joints.{}", joint.name)));
+    for parameter in old.parameters().into_iter().filter(|parameter| is_free(free, &parameter.path(&old))) {
+        match parameter {
+            Parameter::Base => rig.robot.base = None,
+            Parameter::JointField { joint, .. } if chain => {
+                let joint = &mut rig.robot.joints[joint];
+                (joint.offset, joint.d, joint.a, joint.alpha, joint.beta) = (None, None, None, None, None);
+            }
+            Parameter::JointField { .. } => {}
+            Parameter::CameraPose(camera) => rig.cameras[camera].pose = None,
+            Parameter::CameraField { camera, .. } => {
+                let camera = &mut rig.cameras[camera];
+                let Some(header) = recording.cameras.iter().find(|recorded| recorded.name == camera.name) else {
+                    continue;
+                };
+                camera.fx = header.fx.or(camera.fx);
+                camera.fy = header.fy.or(camera.fy);
+                camera.cx = header.cx.or(camera.cx);
+                camera.cy = header.cy.or(camera.cy);
+                if header.model.is_none() || header.model == camera.model {
+                    camera.distortion = header.distortion.clone().or(camera.distortion.take());
+                }
+            }
+            Parameter::FeatureXyz(feature) => rig.features[feature].xyz = None,
+            Parameter::TargetPose(target) => rig.targets[target].pose = None,
+        }
+    }
+}
+
+/// What is held must be complete: what a rig lacks is not learned on the side, but for cameras and features that are new.
+fn check_rest(rig: &Rig, part: &Rig, free: &[String]) -> Result<(), Error> {
+    let missing = |parameter: &&Parameter| {
+        let path = parameter.path(part);
+        !matches!(parameter, Parameter::Base) && !part.has_value(parameter) && !is_free(free, &path)
+    };
+    let parameters = rig.parameters();
+    match parameters.iter().find(missing) {
+        Some(parameter) => Err(Error::Unusable(format!(
+            "the rig has no value for `{}`, which is neither learned anew nor can be held: calibrate the whole rig first",
+            parameter.path(rig)
+        ))),
+        None if rig.cameras.is_empty() && rig.features.is_empty() => Model::new(rig).map(|_| ()),
+        None => Ok(()),
+    }
+}
