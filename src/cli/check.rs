@@ -4,11 +4,11 @@ use super::counts::Counts;
 use super::inputs::{RigInput, read_recordings, read_rig};
 use super::survey::Survey;
 use super::table::Table;
-use super::words::{count, list, px};
+use super::words::{count, list};
 use clap::Args;
 use handeye::Error;
 use handeye::calibrate::{Options, states_in_words};
-use handeye::doctor::{Diagnosis, examine};
+use handeye::doctor::{Diagnosis, Misfit, examine};
 use handeye::rig::{Camera, Model, Parent, Rig};
 use serde_json::json;
 use std::path::PathBuf;
@@ -62,16 +62,27 @@ impl Check {
             let survey = Survey::new(rig, &recording);
             text += &format!("\n{survey}");
             json["recording"] = survey.json();
-            let states = states_in_words(rig, &recording)?;
-            text += &format!("\nthe robot's state:\n{}", lines(&states));
-            json["states"] = json!(states);
-            let diagnosis = examine(rig, &recording, &Options::default())?;
+            match states_in_words(rig, &recording) {
+                Ok(states) => {
+                    text += &format!("\nthe robot's state:\n{}", lines(&states));
+                    json["states"] = json!(states);
+                }
+                Err(error) => text += &format!("\nthe robot's state is not known: {error}\n"),
+            }
+            let diagnosis = examine(rig, &recording, &Options::default());
             text += &format!("\n{}", tell(&diagnosis));
             json["scores"] = diagnosis
                 .scores
                 .iter()
-                .map(|s| json!({"alternative": s.alternative, "median_px": s.median_px}))
+                .map(|score| match score.misfit {
+                    None => json!({ "alternative": score.alternative }),
+                    Some(Misfit::Pixels(px)) => json!({ "alternative": score.alternative, "median_px": px }),
+                    Some(Misfit::Poses { turn, shift }) => {
+                        json!({ "alternative": score.alternative, "median_rad": turn, "median_m": shift })
+                    }
+                })
                 .collect();
+            json["unsolved"] = json!(diagnosis.unsolved);
             json["findings"] = diagnosis.findings.iter().map(|f| json!({"what": f.what, "change": f.change})).collect();
         }
         Ok(Answer::new(text, json))
@@ -83,12 +94,15 @@ fn lines(lines: &[String]) -> String {
 }
 
 fn tell(diagnosis: &Diagnosis) -> String {
-    let mut table = Table::new(&["if", "median px"]);
+    let mut table = Table::new(&["if", "median misfit"]);
     for score in &diagnosis.scores {
-        let cell = score.median_px.map_or_else(|| "no fit".to_owned(), px);
-        table.row([score.alternative.to_owned(), cell]);
+        let cell = score.misfit.map_or_else(|| "no fit".to_owned(), |misfit| misfit.to_string());
+        table.row([score.alternative.clone(), cell]);
     }
     let mut text = if diagnosis.scores.is_empty() { String::new() } else { table.to_string() };
+    if let Some(reason) = &diagnosis.unsolved {
+        text += &format!("\nnothing can be learned from the data as recorded: {reason}\n");
+    }
     for finding in &diagnosis.findings {
         text += &format!("\n  {}: {}\n", finding.what, finding.change);
     }

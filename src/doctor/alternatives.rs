@@ -1,56 +1,99 @@
-//! How else the data may have come about: each a rig and a recording with one mistake undone.
+//! How else data with pixels may have come about: each a rig and a recording with one mistake undone.
+use super::undo;
 use crate::chain::JointKind;
 use crate::recording::Recording;
-use crate::rig::Rig;
+use crate::rig::{Camera, Feature, Parent, Rig};
 
 /// The data with one mistake undone.
 pub(super) struct Alternative {
-    pub name: &'static str,
-    pub change: &'static str,
+    pub name: String,
+    pub change: String,
     pub rig: Rig,
     pub recording: Recording,
 }
 
 /// The alternatives that apply.
 pub(super) fn all(rig: &Rig, recording: &Recording) -> Vec<Alternative> {
-    let as_recorded = |name, change| Alternative { name, change, rig: rig.clone(), recording: recording.clone() };
-    let is_revolute = |joint: usize| rig.robot.joints.get(joint).is_none_or(|joint| joint.kind == JointKind::Revolute);
+    let as_recorded = |name: &str, change: &str| Alternative {
+        name: name.to_owned(),
+        change: change.to_owned(),
+        rig: rig.clone(),
+        recording: recording.clone(),
+    };
+    let has_joints = recording.samples.iter().any(|sample| sample.joints.is_some());
     let mut all = Vec::new();
-
-    let mut degrees = as_recorded("joints are in degrees", "divide the readings of revolute joints by 57.2958");
-    for joints in degrees.recording.samples.iter_mut().filter_map(|sample| sample.joints.as_mut()) {
-        joints.iter_mut().enumerate().filter(|(i, _)| is_revolute(*i)).for_each(|(_, j)| *j = j.to_radians());
+    if has_joints {
+        all.extend(units(rig, as_recorded));
+    } else {
+        for (name, change, undo) in undo::OF_POSES.into_iter().take(2) {
+            let mut alternative = as_recorded(&format!("robot poses are {name}"), change);
+            if name == "inverted" {
+                // Pixels alone do not tell the two apart.
+                alternative.change += ", or, if they are right, exchange the parents of cameras and features";
+            }
+            let poses = alternative.recording.samples.iter_mut().filter_map(|sample| sample.pose.as_mut());
+            poses.for_each(|pose| *pose = undo(pose));
+            all.push(alternative);
+        }
     }
-    all.push(degrees);
-
-    for (shift, name, change) in [
-        (1, "joints are one sample late", "pair each image with the joints of the next sample"),
-        (-1, "joints are one sample early", "pair each image with the joints of the sample before"),
-    ] {
-        let mut shifted = as_recorded(name, change);
-        let samples = &recording.samples;
-        shifted.recording.samples = (0..samples.len())
-            .filter_map(|i| {
-                let read = samples.get(i.checked_add_signed(shift)?)?;
-                Some(crate::recording::Sample { joints: read.joints.clone(), ..samples[i].clone() })
-            })
-            .collect();
-        all.push(shifted);
+    let rows = if has_joints { "joints" } else { "robot poses" };
+    for (name, change, rows) in undo::pairings(rows, recording.samples.len()) {
+        all.push(Alternative { recording: undo::paired(recording, &rows), ..as_recorded(&name, &change) });
     }
+    all.extend(other_side(rig, recording).map(|(rig, declared, parent)| {
+        let name = format!("cameras that are declared {declared} move as if they were not");
+        let change = format!("set the parent of the cameras to \"{parent}\", and that of the features to the other");
+        Alternative { rig, ..as_recorded(&name, &change) }
+    }));
+    all
+}
 
-    let mut axes = as_recorded("u and v are swapped", "write pixels as [u, v]: u to the right, v down");
-    axes.recording.samples.iter_mut().flat_map(|sample| &mut sample.pixels).for_each(|seen| seen.pixel.reverse());
-    all.push(axes);
-
-    let mut centre = as_recorded("principal points have their coordinates swapped", "exchange cx and cy");
-    for camera in &mut centre.rig.cameras {
-        std::mem::swap(&mut camera.cx, &mut camera.cy);
-    }
-    for camera in &mut centre.recording.cameras {
-        std::mem::swap(&mut camera.cx, &mut camera.cy);
-    }
-    if centre.rig != *rig || centre.recording != *recording {
-        all.push(centre);
+fn units(rig: &Rig, as_recorded: impl Fn(&str, &str) -> Alternative) -> Vec<Alternative> {
+    let kind = |joint: usize| rig.robot.joints.get(joint).map_or(JointKind::Revolute, |joint| joint.kind);
+    let scaled = |mut alternative: Alternative, of: JointKind, factor: f64| {
+        for joints in alternative.recording.samples.iter_mut().filter_map(|sample| sample.joints.as_mut()) {
+            joints.iter_mut().enumerate().filter(|(i, _)| kind(*i) == of).for_each(|(_, reading)| *reading *= factor);
+        }
+        alternative
+    };
+    let degrees = as_recorded("joints are in degrees", "divide the readings of revolute joints by 57.2958");
+    let mut all = vec![scaled(degrees, JointKind::Revolute, 1f64.to_radians())];
+    if rig.robot.joints.iter().any(|joint| joint.kind == JointKind::Prismatic) {
+        let lengths =
+            as_recorded("prismatic joints are in millimetres", "divide the readings of prismatic joints by 1000");
+        all.push(scaled(lengths, JointKind::Prismatic, 1e-3));
     }
     all
+}
+
+/// The rig with cameras and features on the other side of the robot, what the cameras are declared to be, and what would do.
+fn other_side(rig: &Rig, recording: &Recording) -> Option<(Rig, &'static str, &'static str)> {
+    let mut other = rig.clone();
+    for recorded in &recording.cameras {
+        if !other.cameras.iter().any(|camera| camera.name == recorded.name) {
+            other.cameras.push(Camera { name: recorded.name.clone(), ..Camera::default() });
+        }
+    }
+    for name in &recording.features {
+        if !other.features.iter().any(|feature| feature.name == *name) {
+            other.features.push(Feature { name: name.clone(), parent: Parent::Tip, xyz: None });
+        }
+    }
+    let first = other.cameras.first()?.parent;
+    let (declared, parent, to) = match first {
+        Parent::World => ("in the world", "tip", Parent::Tip),
+        Parent::Tip => ("on the tip", "world", Parent::World),
+        Parent::Link(_) => return None,
+    };
+    if other.cameras.iter().any(|camera| camera.parent != first) {
+        return None;
+    }
+    for camera in &mut other.cameras {
+        (camera.parent, camera.pose) = (to, None);
+    }
+    for feature in other.features.iter_mut() {
+        // Coordinates in the other frame are not known; the shape is learned again.
+        (feature.parent, feature.xyz) = (first, None);
+    }
+    Some((other, declared, parent))
 }

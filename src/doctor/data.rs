@@ -1,19 +1,110 @@
 //! What the samples themselves show, without a model.
 use super::Finding;
+use crate::chain::JointKind;
 use crate::recording::Recording;
+use crate::rig::Rig;
+use handeye_solvers::Pose;
+use handeye_solvers::manifold::so3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Share of samples that may repeat an earlier one before it is worth saying.
 const REPEATED: f64 = 0.2;
 
-/// Samples that repeat.
-pub(super) fn findings(recording: &Recording) -> Vec<Finding> {
-    let joints: Vec<_> = recording.samples.iter().filter_map(|sample| sample.joints.as_ref()).collect();
-    let repeats = (0..joints.len()).filter(|&i| joints[..i].contains(&joints[i])).count();
-    if (repeats as f64) <= REPEATED * joints.len() as f64 {
-        return Vec::new();
+/// A tip that turns by less than this [rad, rms] about every axis but one determines little.
+const TURN: f64 = 0.05;
+
+/// A joint that moves by less than this [rad, m] stands still.
+const STILL: f64 = 1e-3;
+
+/// No arm reaches so far, and no target is so far away [m].
+const FAR: f64 = 20.0;
+
+/// Everything that needs no solve. `tips`: `world_from_tip` of each sample, where it is known.
+pub(super) fn findings(rig: &Rig, recording: &Recording, tips: &[Option<Pose>]) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    findings.extend(repeats(recording));
+    findings.extend(one_joint(recording));
+    findings.extend(one_axis(tips));
+    findings.extend(distances(rig, recording));
+    findings
+}
+
+fn repeats(recording: &Recording) -> Option<Finding> {
+    let samples = &recording.samples;
+    let states = |i: usize| (samples[i].joints.as_ref(), samples[i].pose.as_ref());
+    let read: Vec<usize> = (0..samples.len()).filter(|i| states(*i) != (None, None)).collect();
+    let n = read.len();
+    let repeats = (0..n).filter(|&k| read[..k].iter().any(|&earlier| states(earlier) == states(read[k]))).count();
+    (repeats as f64 > REPEATED * n as f64).then(|| Finding {
+        what: format!("{repeats} of {n} samples repeat the robot's state of an earlier one"),
+        change: "record more varied positions".into(),
+    })
+}
+
+fn one_joint(recording: &Recording) -> Option<Finding> {
+    let read: Vec<&Vec<f64>> = recording.samples.iter().filter_map(|sample| sample.joints.as_ref()).collect();
+    let moves = |joint: &usize| {
+        let readings = || read.iter().map(|joints| joints[*joint]);
+        readings().fold(f64::NEG_INFINITY, f64::max) - readings().fold(f64::INFINITY, f64::min) > STILL
+    };
+    let moving: Vec<usize> = (0..recording.joints.len()).filter(moves).collect();
+    let what = match moving[..] {
+        _ if read.len() < 2 || recording.joints.len() < 2 => return None,
+        [] => "no joint moves".to_owned(),
+        [joint] => format!("only joint {} moves", recording.joints[joint]),
+        _ => return None,
+    };
+    Some(Finding { what, change: "record positions in which all joints differ".into() })
+}
+
+/// All rotations about one axis leave the positions along it open.
+fn one_axis(tips: &[Option<Pose>]) -> Option<Finding> {
+    let tips: Vec<Pose> = tips.iter().flatten().copied().collect();
+    let n = tips.len();
+    if n < 3 {
+        return None;
     }
-    vec![Finding {
-        what: format!("{repeats} of {} samples repeat the joints of an earlier one", joints.len()),
-        change: "record more varied positions".to_owned(),
-    }]
+    let mut spread = Matrix3::zeros();
+    for i in 0..n {
+        let turn = so3::log(&(tips[i].rotation.transpose() * tips[(i + n / 3 + 1) % n].rotation));
+        spread += turn * turn.transpose() / n as f64;
+    }
+    let eigen = spread.try_symmetric_eigen(f64::EPSILON, 200)?;
+    let mut order = [0, 1, 2];
+    order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
+    let rms = |k: usize| eigen.eigenvalues[order[k]].max(0.0).sqrt();
+    let axis: Vector3<f64> = eigen.eigenvectors.column(order[0]).into_owned();
+    let axis = axis * axis[axis.iamax()].signum();
+    let what = match (rms(0) > TURN, rms(1) > TURN) {
+        (_, true) => return None,
+        (true, false) => {
+            format!("all rotations are about one axis of the tip: ({:.3}, {:.3}, {:.3})", axis.x, axis.y, axis.z)
+        }
+        (false, false) => "the tip does not turn".to_owned(),
+    };
+    Some(Finding { what, change: "record positions that turn about another axis too, by 30 degrees or more".into() })
+}
+
+/// Lengths that only millimetres would explain.
+fn distances(rig: &Rig, recording: &Recording) -> Vec<Finding> {
+    let far = |mut lengths: Vec<f64>| !lengths.is_empty() && crate::calibrate::evaluate::median(&mut lengths) > FAR;
+    let samples = &recording.samples;
+    let mut findings = Vec::new();
+    let mut add = |what: String| findings.push(Finding { what, change: "divide their positions by 1000".into() });
+    if far(samples.iter().filter_map(|sample| sample.pose).map(|pose| pose.translation.norm()).collect()) {
+        add("robot poses are in millimetres".into());
+    }
+    if far(samples.iter().flat_map(|sample| &sample.targets).map(|seen| seen.pose.translation.norm()).collect()) {
+        add("target poses are in millimetres".into());
+    }
+    for (index, joint) in rig.robot.joints.iter().enumerate().filter(|(_, joint)| joint.kind == JointKind::Prismatic) {
+        let read: Vec<f64> = samples.iter().filter_map(|s| Some(s.joints.as_ref()?.get(index)?.abs())).collect();
+        if far(read) {
+            findings.push(Finding {
+                what: format!("prismatic joint {} is in millimetres", joint.name),
+                change: "divide its readings by 1000".into(),
+            });
+        }
+    }
+    findings
 }

@@ -1,23 +1,46 @@
 //! Looks for mistakes in a recording before it is learned from: each as an alternative, scored against the data as recorded.
 mod alternatives;
 mod data;
+mod images;
+mod lag;
+mod pixels;
+mod poses;
+mod undo;
 
-use crate::Error;
-use crate::calibrate::{self, Finding as Misfit, calibrate, evaluate};
+use crate::calibrate;
+use crate::chain::JointKind;
 use crate::recording::Recording;
-use crate::rig::Rig;
-use std::ops::ControlFlow;
+use crate::rig::{Model, Rig};
+use handeye_solvers::Pose;
 
-/// An alternative is a finding where its score is below this share of the score as recorded.
+/// An alternative is a finding where its misfit is below this share of the misfit as recorded.
 const CLEARLY_BETTER: f64 = 0.5;
+
+/// A turn [rad] and a shift [m] that weigh the same.
+const TURN: f64 = 0.01;
+const SHIFT: f64 = 0.005;
+
+/// How far a hypothesis is from the data, in the median of all detections.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Misfit {
+    /// Distance of detections from where the rig learned under the hypothesis predicts them [px].
+    Pixels(f64),
+    /// Disagreement of the robot's and the target's motions.
+    Poses {
+        /// Angle [rad].
+        turn: f64,
+        /// Distance [m].
+        shift: f64,
+    },
+}
 
 /// One hypothesis of how the data came about and how well it explains them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Score {
     /// The hypothesis, in words.
-    pub alternative: &'static str,
-    /// Median pixel distance of all detections under the rig learned from it [px]; `None` where no rig could be learned.
-    pub median_px: Option<f64>,
+    pub alternative: String,
+    /// Its misfit; `None` where nothing could be learned under it.
+    pub misfit: Option<Misfit>,
 }
 
 /// A mistake in the data, or something that they lack.
@@ -36,52 +59,84 @@ pub struct Diagnosis {
     pub scores: Vec<Score>,
     /// Empty where nothing is wrong.
     pub findings: Vec<Finding>,
+    /// Why nothing could be learned from the data as recorded, where that is so.
+    pub unsolved: Option<String>,
 }
 
-/// Examines a recording with joints and pixels: units, pairing, image axes, principal points, repeated samples.
+/// Examines a recording: units, inverted poses, orders of quaternions, pairing of rows and images, time lag, image axes,
+/// principal points, the side of the robot that cameras are on, repeated samples, rotations that are all about one axis.
 ///
-/// A whole calibration is made per alternative. Errors: [`Error::Unusable`] where rig and recording do not go together.
-pub fn examine(rig: &Rig, recording: &Recording, options: &calibrate::Options) -> Result<Diagnosis, Error> {
-    let mut diagnosis = Diagnosis { findings: data::findings(recording), ..Diagnosis::default() };
-    if !recording.samples.iter().any(|sample| sample.joints.is_some() && !sample.pixels.is_empty()) {
-        return Ok(diagnosis);
+/// Targets and tip poses are compared in closed form. Pixels take a whole calibration per alternative, most of them only where
+/// the data as recorded are not explained to about their noise. Never fails: what could not be done is in the diagnosis.
+pub fn examine(rig: &Rig, recording: &Recording, options: &calibrate::Options) -> Diagnosis {
+    let tips = tips(rig, recording, f64::to_owned);
+    let mut diagnosis = Diagnosis { findings: data::findings(rig, recording, &tips), ..Diagnosis::default() };
+    let turns_freely =
+        !diagnosis.findings.iter().any(|finding| finding.what.contains("turn") || finding.what.contains("one axis"));
+    if let Some(pairs) = poses::Pairs::new(rig, recording, &tips).filter(|_| turns_freely) {
+        let has_poses = recording.samples.iter().any(|sample| sample.pose.is_some());
+        let in_degrees = (!has_poses).then(|| self::tips(rig, recording, |reading| reading.to_radians()));
+        pairs.examine(in_degrees.as_deref(), &mut diagnosis.scores, &mut diagnosis.findings);
     }
-    let (as_recorded, misfits) = score(rig, recording, options)?;
-    diagnosis.scores.push(Score { alternative: "as recorded", median_px: as_recorded });
-    for misfit in &misfits {
-        if let Misfit::WrongJoints { sample, swapped_with: Some(other), .. } = misfit
-            && sample < other
-        {
-            diagnosis.findings.push(Finding {
-                what: format!("the joint rows of samples {sample} and {other} are swapped"),
-                change: "exchange the joints of the two samples".to_owned(),
-            });
+    let is_seen = |sample: &crate::recording::Sample| !sample.pixels.is_empty();
+    let is_read = |sample: &crate::recording::Sample| sample.joints.is_some() || sample.pose.is_some();
+    if recording.samples.iter().any(|sample| is_seen(sample) && is_read(sample)) {
+        pixels::examine(rig, recording, options, &mut diagnosis);
+    }
+    let mut known: Vec<Finding> = Vec::new();
+    for finding in std::mem::take(&mut diagnosis.findings) {
+        if !known.iter().any(|known| known.what == finding.what) {
+            known.push(finding);
         }
     }
-    let mut best: Option<(f64, alternatives::Alternative)> = None;
-    for alternative in alternatives::all(rig, recording) {
-        let (median_px, _) = score(&alternative.rig, &alternative.recording, options)?;
-        diagnosis.scores.push(Score { alternative: alternative.name, median_px });
-        let limit = best.as_ref().map_or(CLEARLY_BETTER * as_recorded.unwrap_or(f64::INFINITY), |best| best.0);
-        if let Some(found) = median_px.filter(|found| *found < limit) {
-            best = Some((found, alternative));
-        }
-    }
-    if let Some((_, alternative)) = best {
-        let (what, change) = (alternative.name.to_owned(), alternative.change.to_owned());
-        diagnosis.findings.push(Finding { what, change });
-    }
-    Ok(diagnosis)
+    diagnosis.findings = known;
+    diagnosis
 }
 
-/// How well a rig learned from the recording explains all of it, and what does not fit.
-fn score(rig: &Rig, recording: &Recording, options: &calibrate::Options) -> Result<(Option<f64>, Vec<Misfit>), Error> {
-    match calibrate(rig, recording, options, &mut |_| ControlFlow::Continue(())) {
-        Ok(learned) => {
-            let median_px = evaluate(&learned.rig, recording).ok().map(|judged| judged.total.median_px);
-            Ok((median_px.filter(|median| median.is_finite()), learned.report.findings))
+/// `world_from_tip` of every sample: as recorded, or by the joints of a chain that is known.
+///
+/// `angle` makes radians of the reading of a revolute joint.
+fn tips(rig: &Rig, recording: &Recording, angle: impl Fn(&f64) -> f64) -> Vec<Option<Pose>> {
+    let arm = Rig { cameras: Vec::new(), features: Vec::new(), targets: Vec::new(), ..rig.clone() };
+    let n_joints = recording.joints.len();
+    let model = Model::new(&arm).ok().filter(|model| n_joints > 0 && model.chain.len() == n_joints);
+    let by_joints = |joints: &Vec<f64>| {
+        let kinds = rig.robot.joints.iter().map(|joint| joint.kind);
+        let read = |(reading, kind)| if kind == JointKind::Revolute { angle(reading) } else { *reading };
+        model.as_ref().map(|model| model.tip(&joints.iter().zip(kinds).map(read).collect::<Vec<f64>>()))
+    };
+    recording.samples.iter().map(|sample| sample.pose.or_else(|| by_joints(sample.joints.as_ref()?))).collect()
+}
+
+/// True where the misfit is far below that of the data as recorded, or where only it could be had.
+fn is_clearly_better(misfit: Option<Misfit>, as_recorded: Option<Misfit>) -> bool {
+    let limit = as_recorded.map_or(f64::INFINITY, |recorded| CLEARLY_BETTER * recorded.size());
+    misfit.is_some_and(|misfit| misfit.size() < limit)
+}
+
+impl Misfit {
+    /// Pixels, or turn and shift weighed against each other: comparable among misfits of one kind.
+    fn size(&self) -> f64 {
+        match self {
+            Misfit::Pixels(px) => *px,
+            Misfit::Poses { turn, shift } => (turn / TURN).hypot(shift / SHIFT),
         }
-        Err(error) if error.is_input() => Err(error),
-        Err(_) => Ok((None, Vec::new())),
+    }
+
+    fn turn(&self) -> f64 {
+        if let Misfit::Poses { turn, .. } = self { *turn } else { 0.0 }
+    }
+
+    fn shift(&self) -> f64 {
+        if let Misfit::Poses { shift, .. } = self { *shift } else { 0.0 }
+    }
+}
+
+impl std::fmt::Display for Misfit {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Misfit::Pixels(px) => write!(f, "{px:.3} px"),
+            Misfit::Poses { turn, shift } => write!(f, "{:.2}°, {:.2} mm", turn.to_degrees(), 1e3 * shift),
+        }
     }
 }

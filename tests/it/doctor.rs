@@ -1,52 +1,102 @@
 //! Mistakes in a recording are found before it is learned from, and none in a clean one.
+#[path = "../../benches/common/faults.rs"]
+mod faults;
+
+use faults::Fault;
 use handeye::calibrate::Options;
 use handeye::doctor::examine;
 use handeye::recording::Recording;
 use handeye::rig::Rig;
 use handeye::simulate::{SimulateOptions, random_rig, simulate};
 
-/// What is found in three recordings of random rigs, spoilt in one way.
-fn found(spoil: impl Fn(&mut Recording)) -> Vec<Vec<String>> {
-    let find = |seed| {
-        let rig = random_rig(6, 2, 12, seed);
-        let mut recording = simulate(&rig, &SimulateOptions { seed, ..SimulateOptions::default() }).unwrap().recording;
-        spoil(&mut recording);
-        let diagnosis = examine(&Rig::default(), &recording, &Options::default()).unwrap();
-        diagnosis.findings.into_iter().map(|finding| finding.what).collect()
-    };
-    (1..=3).map(find).collect()
+const SEEDS: std::ops::RangeInclusive<u64> = 1..=5;
+
+fn found(rig: &Rig, recording: &Recording) -> Vec<String> {
+    let diagnosis = examine(rig, recording, &Options::default());
+    diagnosis.findings.into_iter().map(|finding| finding.what).collect()
+}
+
+/// Pixels of a random rig, of which nothing is known but the intrinsics, with joints or with tip poses.
+fn pixels(seed: u64, by_joints: bool) -> (Rig, Recording) {
+    let rig = random_rig(6, 2, 12, seed);
+    let simulation = simulate(&rig, &SimulateOptions { seed, ..SimulateOptions::default() }).unwrap();
+    let mut recording = simulation.recording;
+    if !by_joints {
+        recording.joints.clear();
+        for (sample, truth) in recording.samples.iter_mut().zip(simulation.truth.samples) {
+            (sample.joints, sample.pose) = (None, truth.pose);
+        }
+    }
+    (Rig::default(), recording)
+}
+
+fn is_found(fault: &Fault, (mut rig, mut recording): (Rig, Recording), seed: u64) {
+    (fault.plant)(&mut rig, &mut recording);
+    let found = found(&rig, &recording);
+    assert!(found.len() == 1 && found[0].contains(fault.says), "{}, seed {seed}: {found:?}", fault.name);
 }
 
 #[test]
 fn nothing_is_found_in_clean_recordings() {
-    assert_eq!(found(|_| ()), vec![Vec::<String>::new(); 3]);
+    for seed in SEEDS {
+        for (rig, recording) in [pixels(seed, true), pixels(seed, false), faults::targets(seed, 30, false)] {
+            assert_eq!(found(&rig, &recording), Vec::<String>::new(), "seed {seed}");
+        }
+    }
 }
 
 #[test]
-fn degrees_are_found() {
-    let spoil = |recording: &mut Recording| {
-        let joints = recording.samples.iter_mut().filter_map(|sample| sample.joints.as_mut()).flatten();
-        joints.for_each(|joint| *joint = joint.to_degrees());
-    };
-    assert_eq!(found(spoil), vec![vec!["joints are in degrees"]; 3]);
+fn every_mistake_of_targets_and_tip_poses_is_found() {
+    for fault in faults::of_targets() {
+        SEEDS.for_each(|seed| is_found(&fault, faults::targets(seed, 30, false), seed));
+    }
 }
 
 #[test]
-fn two_swapped_joint_rows_are_found() {
-    let spoil = |recording: &mut Recording| {
-        let joints = recording.samples[4].joints.clone();
-        recording.samples[4].joints = recording.samples[9].joints.clone();
-        recording.samples[9].joints = joints;
-    };
-    assert_eq!(found(spoil), vec![vec!["the joint rows of samples 4 and 9 are swapped"]; 3]);
+fn rotations_about_one_axis_are_found_with_the_axis() {
+    for seed in SEEDS {
+        let (rig, recording) = faults::targets(seed, 30, true);
+        let found = found(&rig, &recording);
+        assert!(found.len() == 1 && found[0].contains("one axis of the tip: ("), "seed {seed}: {found:?}");
+    }
+}
+
+/// One test per fault, which takes several calibrations for every seed.
+macro_rules! mistakes_of_pixels {
+    ($($test:ident: $faults:ident, $fault:literal;)*) => {$(
+        #[test]
+        fn $test() {
+            let by_joints = stringify!($faults) == "of_joints";
+            let fault = faults::$faults().into_iter().find(|fault| fault.name == $fault).unwrap();
+            SEEDS.for_each(|seed| is_found(&fault, pixels(seed, by_joints), seed));
+        }
+    )*};
+}
+
+mistakes_of_pixels! {
+    inverted_tip_poses_are_found: of_tips, "robot inverted";
+    quaternions_of_tips_with_w_first_are_found: of_tips, "robot wxyz";
+    tips_in_millimetres_are_found: of_tips, "robot mm";
+    tip_poses_a_sample_early_are_found: of_tips, "robot a sample early";
+    degrees_are_found: of_joints, "degrees";
+    joints_a_sample_early_are_found: of_joints, "joints a sample early";
+    joints_a_sample_late_are_found: of_joints, "joints a sample late";
+    joints_two_samples_early_are_found: of_joints, "joints 2 samples early";
+    joints_in_reverse_order_are_found: of_joints, "joints reversed";
+    two_swapped_joint_rows_are_found: of_joints, "two rows swapped";
+    swapped_image_axes_are_found: of_joints, "u, v swapped";
+    swapped_principal_points_are_found: of_joints, "cx, cy swapped";
+    cameras_declared_on_the_hand_are_found: of_joints, "declared on the hand";
+    repeated_samples_are_found: of_joints, "samples repeat";
 }
 
 #[test]
-fn joints_that_are_a_sample_off_are_found() {
-    let spoil = |recording: &mut Recording| {
-        let mut joints: Vec<_> = recording.samples.iter().map(|sample| sample.joints.clone()).collect();
-        joints.rotate_left(1);
-        recording.samples.iter_mut().zip(joints).for_each(|(sample, joints)| sample.joints = joints);
-    };
-    assert_eq!(found(spoil), vec![vec!["joints are one sample early"]; 3]);
+fn one_moving_joint_is_found() {
+    let (rig, mut recording) = pixels(1, true);
+    let first = recording.samples[0].joints.clone().unwrap();
+    for sample in &mut recording.samples {
+        let joints = sample.joints.as_mut().unwrap();
+        joints[..5].copy_from_slice(&first[..5]);
+    }
+    assert!(found(&rig, &recording).contains(&"only joint j6 moves".to_owned()));
 }

@@ -1,6 +1,7 @@
 //! Real recordings and the peers' problems, where they are there: beside the project, or where HANDEYE_SHARED says.
 //!
 //! `cargo test --test recordings`; not part of the plain `cargo test`, which needs nothing but this project.
+mod doctor;
 mod dvrk;
 mod franka;
 mod peers;

@@ -7,10 +7,17 @@ use handeye::rig::Rig;
 /// Images that match no listed pose, by sample, all of cam4.
 const WRONG_IMAGES: [usize; 6] = [8, 13, 14, 30, 32, 37];
 
-fn read() -> Option<(Rig, Recording)> {
+pub fn read() -> Option<(Rig, Recording)> {
     let folder = shared("data/ur3e-checkerboard")?;
     let rig = Rig::read(&folder.join("ur3e.toml")).expect("the rig is valid");
     Some((rig, Recording::read(&folder.join("recording.jsonl")).expect("the recording is valid")))
+}
+
+/// The recording without samples 24 and 25, the wrong images and the camera that moved.
+pub fn without_mistakes() -> Option<(Rig, Recording)> {
+    let (mut rig, recording) = read()?;
+    rig.cameras.retain(|camera| camera.name != "cam3");
+    Some((rig, part(&recording, |sample| sample != 24 && sample != 25, is_right)))
 }
 
 fn is_held_out(sample: usize) -> bool {

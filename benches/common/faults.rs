@@ -1,0 +1,162 @@
+//! Mistakes planted in recordings, and what the doctor has to say of each.
+use handeye::recording::{RecordedCamera, Recording, Sample, TargetDetection};
+use handeye::rig::{Camera, Feature, Parent, Rig};
+use handeye::solvers::Pose;
+use handeye::solvers::manifold::so3;
+use nalgebra::Vector3;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// A mistake: its name, what a finding about it contains, and how it is made.
+pub struct Fault {
+    pub name: &'static str,
+    pub says: &'static str,
+    pub plant: fn(&mut Rig, &mut Recording),
+}
+
+/// Mistakes of recordings with joints and pixels.
+pub fn of_joints() -> Vec<Fault> {
+    let fault = |name, says, plant| Fault { name, says, plant };
+    vec![
+        fault("degrees", "joints are in degrees", |_, recording| {
+            recording.samples.iter_mut().flat_map(|s| &mut s.joints).flatten().for_each(|j| *j = j.to_degrees());
+        }),
+        fault("joints a sample early", "joints are one sample early", |_, recording| {
+            rows(recording, |i, n| (i + 1) % n)
+        }),
+        fault("joints a sample late", "joints are one sample late", |_, recording| {
+            rows(recording, |i, n| (i + n - 1) % n)
+        }),
+        fault("joints 2 samples early", "joints are 2 samples early", |_, recording| {
+            rows(recording, |i, n| (i + 2) % n)
+        }),
+        fault("joints reversed", "joints are in reverse order", |_, recording| rows(recording, |i, n| n - 1 - i)),
+        fault("two rows swapped", "the joint rows of samples 4 and 9 are swapped", |_, recording| {
+            rows(recording, |i, _| [(4, 9), (9, 4)].iter().find(|pair| pair.0 == i).map_or(i, |pair| pair.1));
+        }),
+        fault("u, v swapped", "u and v are swapped", |_, recording| {
+            recording.samples.iter_mut().flat_map(|s| &mut s.pixels).for_each(|seen| seen.pixel.reverse());
+        }),
+        fault("cx, cy swapped", "coordinates swapped", |rig, recording| {
+            rig.cameras.iter_mut().for_each(|camera| std::mem::swap(&mut camera.cx, &mut camera.cy));
+            recording.cameras.iter_mut().for_each(|camera| std::mem::swap(&mut camera.cx, &mut camera.cy));
+        }),
+        fault("declared on the hand", "declared on the tip", |rig, recording| {
+            for recorded in &recording.cameras {
+                if !rig.cameras.iter().any(|camera| camera.name == recorded.name) {
+                    rig.cameras.push(Camera { name: recorded.name.clone(), ..Camera::default() });
+                }
+            }
+            rig.cameras.iter_mut().for_each(|camera| camera.parent = Parent::Tip);
+            rig.features = recording.features.iter().map(|name| in_world(name)).collect();
+        }),
+        fault("samples repeat", "repeat the robot's state", |_, recording| {
+            let n = recording.samples.len();
+            for i in 0..n / 3 {
+                recording.samples[n - 1 - i] = recording.samples[i].clone();
+            }
+        }),
+    ]
+}
+
+/// Mistakes of recordings with tip poses and pixels.
+pub fn of_tips() -> Vec<Fault> {
+    let mut all: Vec<Fault> = of_targets().into_iter().filter(|fault| fault.name.starts_with("robot")).collect();
+    all.retain(|fault| fault.name != "robot rows swapped");
+    all
+}
+
+/// Mistakes of recordings with targets and tip poses.
+pub fn of_targets() -> Vec<Fault> {
+    let fault = |name, says, plant| Fault { name, says, plant };
+    vec![
+        fault("robot inverted", "robot poses are inverted", |_, recording| robot(recording, Pose::inverse)),
+        fault("robot wxyz", "robot poses are quaternions in the order", |_, recording| robot(recording, w_first)),
+        fault("robot mm", "robot poses are in millimetres", |_, recording| robot(recording, millimetres)),
+        fault("robot a sample early", "robot poses are one sample early", |_, recording| {
+            rows(recording, |i, n| (i + 1) % n)
+        }),
+        fault("robot rows swapped", "the robot poses of samples 4 and 9 are swapped", |_, recording| {
+            rows(recording, |i, _| [(4, 9), (9, 4)].iter().find(|pair| pair.0 == i).map_or(i, |pair| pair.1));
+        }),
+        fault("target inverted", "target poses are inverted", |_, recording| target(recording, Pose::inverse)),
+        fault("target wxyz", "target poses are quaternions in the order", |_, recording| target(recording, w_first)),
+        fault("target mm", "target poses are in millimetres", |_, recording| target(recording, millimetres)),
+        fault("camera on the other side", "moves as if it were not", |rig, _| {
+            let parent = &mut rig.cameras[0].parent;
+            *parent = if *parent == Parent::World { Parent::Tip } else { Parent::World };
+        }),
+        fault("samples repeat", "repeat the robot's state", |_, recording| {
+            let n = recording.samples.len();
+            for i in 0..n / 3 {
+                recording.samples[n - 1 - i] = recording.samples[i].clone();
+            }
+        }),
+    ]
+}
+
+/// A recording of a target and tip poses: a camera on the hand for even seeds, in the world for odd ones. 1 mm and 0.002 rad of
+/// noise on targets.
+pub fn targets(seed: u64, samples: usize, one_axis: bool) -> (Rig, Recording) {
+    let random = &mut ChaCha8Rng::seed_from_u64(seed);
+    let on_hand = seed.is_multiple_of(2);
+    let x = pose(random, 1.0, [0.05, 0.05, 0.08]);
+    let z = Pose { translation: Vector3::new(0.6, random.random_range(-0.4..0.4), 0.3), ..pose(random, 2.0, [0.1; 3]) };
+    let sample = |_| {
+        // Half a turn about x: the target's z axis points towards the camera.
+        let mut tilt = pose(random, 0.5, [0.2, 0.15, 0.2]);
+        if one_axis {
+            tilt.rotation = so3::exp(&Vector3::new(0.0, 0.0, random.random_range(-1.0..1.0)));
+        }
+        let facing = so3::exp(&Vector3::new(std::f64::consts::PI, 0.0, 0.0));
+        let seen =
+            Pose { rotation: facing * tilt.rotation, translation: tilt.translation + Vector3::new(0.0, 0.0, 0.6) };
+        let tip = z * if on_hand { seen.inverse() } else { seen } * x.inverse();
+        let mut normal = |sd: f64| Vector3::from_fn(|_, _| sd * Distribution::<f64>::sample(&StandardNormal, random));
+        let noise = Pose::new(normal(0.002), normal(0.001));
+        let targets = vec![TargetDetection { camera: 0, target: "tag".into(), pose: seen * noise }];
+        Sample { pose: Some(tip), targets, ..Sample::default() }
+    };
+    let samples = (0..samples).map(sample).collect();
+    let parent = if on_hand { Parent::Tip } else { Parent::World };
+    let rig = Rig { cameras: vec![Camera { name: "camera".into(), parent, ..Camera::default() }], ..Rig::default() };
+    let camera = RecordedCamera { name: "camera".into(), ..RecordedCamera::default() };
+    (rig, Recording { cameras: vec![camera], samples, ..Recording::default() })
+}
+
+fn pose(random: &mut ChaCha8Rng, turn: f64, size: [f64; 3]) -> Pose {
+    let rotation = Vector3::from_fn(|_, _| random.random_range(-turn..turn));
+    Pose::new(rotation, Vector3::from_fn(|i, _| random.random_range(-size[i]..size[i])))
+}
+
+fn in_world(name: &str) -> Feature {
+    Feature { name: name.to_owned(), parent: Parent::World, xyz: None }
+}
+
+/// Gives each of n samples the robot's state of another.
+fn rows(recording: &mut Recording, from: impl Fn(usize, usize) -> usize) {
+    let samples = recording.samples.clone();
+    for (i, sample) in recording.samples.iter_mut().enumerate() {
+        let read = &samples[from(i, samples.len())];
+        (sample.joints, sample.pose) = (read.joints.clone(), read.pose);
+    }
+}
+
+fn robot(recording: &mut Recording, change: impl Fn(&Pose) -> Pose) {
+    recording.samples.iter_mut().for_each(|sample| sample.pose = sample.pose.map(|pose| change(&pose)));
+}
+
+fn target(recording: &mut Recording, change: impl Fn(&Pose) -> Pose) {
+    recording.samples.iter_mut().flat_map(|sample| &mut sample.targets).for_each(|seen| seen.pose = change(&seen.pose));
+}
+
+/// The pose whose quaternion is read in the order in which it was not written.
+fn w_first(pose: &Pose) -> Pose {
+    let [x, y, z, w] = so3::quaternion(&pose.rotation);
+    Pose { rotation: so3::from_quaternion([w, x, y, z]), ..*pose }
+}
+
+fn millimetres(pose: &Pose) -> Pose {
+    Pose { translation: pose.translation * 1000.0, ..*pose }
+}

@@ -1,0 +1,92 @@
+//! How often the doctor finds each of its faults, and how often it finds one in clean recordings: `cargo bench --bench doctor 20`.
+#[path = "common/faults.rs"]
+mod faults;
+
+use faults::Fault;
+use handeye::calibrate::Options;
+use handeye::doctor::examine;
+use handeye::recording::Recording;
+use handeye::rig::Rig;
+use handeye::simulate::{SimulateOptions, random_rig, simulate};
+
+fn main() {
+    let trials = std::env::args().skip(1).find_map(|argument| argument.parse().ok()).unwrap_or(100);
+    println!("{:56} {:>8} {:>8} of {trials}", "", "found", "others");
+    table("targets and tip poses", &faults::of_targets(), trials, |seed| faults::targets(seed, 30, false));
+    table("tip poses and pixels, random rig", &faults::of_tips(), trials, |seed| {
+        by_tips(&random_rig(6, 2, 12, seed), seed)
+    });
+    table("joints and pixels, random rig", &faults::of_joints(), trials, |seed| {
+        by_joints(&random_rig(6, 2, 12, seed), seed)
+    });
+    if let Some((rig, recording)) = ur3e() {
+        table("ur3e-checkerboard, 25 samples of it", &faults::of_joints(), trials, |seed| {
+            (rig.clone(), part(&recording, seed))
+        });
+    }
+}
+
+fn table(setting: &str, faults: &[Fault], trials: u64, data: impl Fn(u64) -> (Rig, Recording)) {
+    let clean = (1..=trials).filter(|seed| !found(&data(*seed)).is_empty()).count();
+    println!("{:56} {:>8} {clean:8}", format!("{setting}, clean"), "");
+    for fault in faults {
+        let (mut hits, mut others) = (0, 0);
+        for seed in 1..=trials {
+            let mut data = data(seed);
+            (fault.plant)(&mut data.0, &mut data.1);
+            let found = found(&data);
+            let hit = found.iter().filter(|what| what.contains(fault.says)).count();
+            hits += usize::from(hit > 0);
+            others += usize::from(found.len() > hit);
+        }
+        println!("{:56} {hits:8} {others:8}", format!("{setting}, {}", fault.name));
+    }
+}
+
+fn found((rig, recording): &(Rig, Recording)) -> Vec<String> {
+    examine(rig, recording, &Options::default()).findings.into_iter().map(|finding| finding.what).collect()
+}
+
+fn by_joints(rig: &Rig, seed: u64) -> (Rig, Recording) {
+    let simulation =
+        simulate(rig, &SimulateOptions { seed, ..SimulateOptions::default() }).expect("the rig is in view");
+    (Rig::default(), simulation.recording)
+}
+
+fn by_tips(rig: &Rig, seed: u64) -> (Rig, Recording) {
+    let simulation =
+        simulate(rig, &SimulateOptions { seed, ..SimulateOptions::default() }).expect("the rig is in view");
+    let mut recording = simulation.recording;
+    recording.joints.clear();
+    for (sample, truth) in recording.samples.iter_mut().zip(simulation.truth.samples) {
+        (sample.joints, sample.pose) = (None, truth.pose);
+    }
+    (Rig::default(), recording)
+}
+
+/// The real recording without its own mistakes, where it is beside the project.
+fn ur3e() -> Option<(Rig, Recording)> {
+    let folder = std::path::Path::new("../shared/data/ur3e-checkerboard");
+    let mut rig = Rig::read(&folder.join("ur3e.toml")).ok()?;
+    let mut recording = Recording::read(&folder.join("recording.jsonl")).ok()?;
+    rig.cameras.retain(|camera| camera.name != "cam3");
+    let cameras: Vec<String> = recording.cameras.iter().map(|camera| camera.name.clone()).collect();
+    for (index, sample) in recording.samples.iter_mut().enumerate() {
+        let wrong = [8, 13, 14, 30, 32, 37].contains(&index);
+        sample.pixels.retain(|seen| match cameras[seen.camera as usize].as_str() {
+            "cam3" => false,
+            "cam4" => !wrong,
+            _ => true,
+        });
+    }
+    Some((rig, recording.select(|sample| sample != 24 && sample != 25)))
+}
+
+/// 25 samples that depend on the seed.
+fn part(recording: &Recording, seed: u64) -> Recording {
+    let n = recording.samples.len();
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by_key(|i| (*i as u64 + 1).wrapping_mul(2 * seed + 0x9e37_79b9_7f4a_7c15).rotate_left(17) % 10_007);
+    let chosen = &order[..n.min(25)];
+    recording.select(|sample| chosen.contains(&sample))
+}

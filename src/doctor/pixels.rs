@@ -1,0 +1,133 @@
+//! Which reading of joints or tip poses explains the pixels: a calibration per alternative.
+use super::alternatives::{self, Alternative};
+use super::images::{self, Axes};
+use super::{Diagnosis, Finding, Misfit, Score, is_clearly_better, lag};
+use crate::Error;
+use crate::calibrate::{self, Calibration, Finding as Unfit, calibrate, evaluate};
+use crate::recording::Recording;
+use crate::rig::Rig;
+use std::ops::ControlFlow;
+
+/// Up to this many standard deviations of a pixel coordinate the median distance is explained by noise (1.18 is its mean).
+const NOISE: f64 = 2.0;
+
+/// A lag is told from a shift by whole samples where its misfit is below this share of the shift's.
+const FINER: f64 = 0.8;
+
+/// Adds scores and findings.
+pub(super) fn examine(rig: &Rig, recording: &Recording, options: &calibrate::Options, diagnosis: &mut Diagnosis) {
+    let axes = images::axes(rig, recording);
+    let (axes_name, axes_change) = ("u and v are swapped", "write pixels as [u, v]: u to the right, v down");
+    if axes == Axes::Swapped {
+        diagnosis.findings.push(finding(axes_name, axes_change));
+        return;
+    }
+    let (as_recorded, found) = match learn(rig, recording, options) {
+        Ok(learned) => (median(&learned.rig, recording), learned.report.findings),
+        Err(error) => {
+            diagnosis.unsolved = Some(error.to_string());
+            if error.is_input() {
+                return;
+            }
+            (None, Vec::new())
+        }
+    };
+    diagnosis.scores.push(Score { alternative: "as recorded".into(), misfit: as_recorded });
+    diagnosis.findings.extend(found.iter().filter_map(swapped));
+
+    // What free intrinsics can hide shows where they are held.
+    let held = images::held(rig, recording);
+    let is_held = held.estimate != rig.estimate;
+    let as_held = |given: Option<Misfit>| if is_held { score(&held, recording, options) } else { given };
+    let mut reference = None;
+    let mut hidden: Vec<Alternative> = Vec::new();
+    let suspects = images::suspects(rig, recording);
+    if !suspects.is_empty() {
+        let (rig, recording) = images::exchanged_centres(&held, recording, &suspects);
+        let name = format!("the principal point of {} has its coordinates swapped", suspects.join(", "));
+        hidden.push(Alternative { name, change: "exchange cx and cy".into(), rig, recording });
+    }
+    if axes == Axes::Open && is_held {
+        let (name, change) = (axes_name.into(), axes_change.into());
+        hidden.push(Alternative { name, change, rig: held.clone(), recording: images::exchanged_axes(recording) });
+    }
+    let mut best: Option<(Misfit, Finding)> = None;
+    for alternative in hidden {
+        let misfit = score(&alternative.rig, &alternative.recording, options);
+        let reference = *reference.get_or_insert_with(|| as_held(as_recorded));
+        consider(alternative, misfit, reference, &mut best, diagnosis);
+    }
+    let explained = NOISE * rig.noise.pixels;
+    let is_explained = as_recorded.is_some_and(|misfit| misfit.size() <= explained);
+    let is_fine = best.as_ref().is_some_and(|(misfit, _)| misfit.size() <= explained);
+    if !is_fine && !is_explained {
+        for alternative in alternatives::all(rig, recording) {
+            let misfit = score(&alternative.rig, &alternative.recording, options);
+            consider(alternative, misfit, as_recorded, &mut best, diagnosis);
+            if best.as_ref().is_some_and(|(misfit, _)| misfit.size() <= explained) {
+                break;
+            }
+        }
+        let is_fine = best.as_ref().is_some_and(|(misfit, _)| misfit.size() <= explained);
+        if let Some(lag) = (!is_fine).then(|| lag::find(rig, recording, options)).flatten() {
+            let misfit = score(rig, &lag.recording, options);
+            let (by, side) = (lag.seconds.abs(), if lag.seconds > 0.0 { "late" } else { "early" });
+            let name = format!("joints are stamped {by:.3} s too {side}");
+            let sign = if lag.seconds > 0.0 { "subtract" } else { "add" };
+            let change =
+                format!("{sign} {by:.3} s {} the stamps of the joints", if sign == "add" { "to" } else { "from" });
+            diagnosis.scores.push(Score { alternative: name.clone(), misfit });
+            let beaten = best.as_ref().map(|(best, _)| FINER * best.size());
+            if let Some(misfit) = misfit.filter(|_| is_clearly_better(misfit, as_recorded))
+                && beaten.is_none_or(|beaten| misfit.size() < beaten)
+            {
+                best = Some((misfit, Finding { what: name, change }));
+            }
+        }
+    }
+    diagnosis.findings.extend(best.map(|(_, finding)| finding));
+}
+
+fn consider(
+    alternative: Alternative,
+    misfit: Option<Misfit>,
+    reference: Option<Misfit>,
+    best: &mut Option<(Misfit, Finding)>,
+    diagnosis: &mut Diagnosis,
+) {
+    let Alternative { name, change, .. } = alternative;
+    diagnosis.scores.push(Score { alternative: name.clone(), misfit });
+    if let Some(misfit) = misfit.filter(|_| is_clearly_better(misfit, reference))
+        && best.as_ref().is_none_or(|(best, _)| misfit.size() < best.size())
+    {
+        *best = Some((misfit, Finding { what: name, change }));
+    }
+}
+
+/// Rows of joints that the calibration itself found to be exchanged.
+fn swapped(unfit: &Unfit) -> Option<Finding> {
+    let Unfit::WrongJoints { sample, swapped_with: Some(other), .. } = unfit else { return None };
+    (sample < other).then(|| {
+        let what = format!("the joint rows of samples {sample} and {other} are swapped");
+        finding(&what, "exchange the joints of the two samples")
+    })
+}
+
+fn finding(what: &str, change: &str) -> Finding {
+    Finding { what: what.to_owned(), change: change.to_owned() }
+}
+
+/// Calibrates, watched by nobody.
+pub(super) fn learn(rig: &Rig, recording: &Recording, options: &calibrate::Options) -> Result<Calibration, Error> {
+    calibrate(rig, recording, options, &mut |_| ControlFlow::Continue(()))
+}
+
+fn score(rig: &Rig, recording: &Recording, options: &calibrate::Options) -> Option<Misfit> {
+    median(&learn(rig, recording, options).ok()?.rig, recording)
+}
+
+/// How well a learned rig explains all of a recording.
+fn median(rig: &Rig, recording: &Recording) -> Option<Misfit> {
+    let median_px = evaluate(rig, recording).ok()?.total.median_px;
+    median_px.is_finite().then_some(Misfit::Pixels(median_px))
+}

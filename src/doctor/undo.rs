@@ -1,0 +1,57 @@
+//! Mistakes of whole recordings, undone: poses that are inverted or written otherwise, rows that belong to other samples.
+use crate::recording::{Recording, Sample};
+use handeye_solvers::Pose;
+use handeye_solvers::manifold::so3;
+
+/// A mistake of poses: how it is called, what to change, and the change.
+type OfPoses = (&'static str, &'static str, fn(&Pose) -> Pose);
+
+/// What may be wrong with poses.
+pub(super) const OF_POSES: [OfPoses; 3] = [
+    ("inverted", "write the inverse of each", Pose::inverse),
+    ("quaternions in the order w, x, y, z", "write quaternions as [x, y, z, w]", reorder),
+    ("in millimetres", "divide their positions by 1000", metres),
+];
+
+/// The pose whose quaternion was written w first and read w last.
+fn reorder(pose: &Pose) -> Pose {
+    let [w, x, y, z] = so3::quaternion(&pose.rotation);
+    Pose { rotation: so3::from_quaternion([x, y, z, w]), ..*pose }
+}
+
+fn metres(pose: &Pose) -> Pose {
+    Pose { translation: pose.translation / 1000.0, ..*pose }
+}
+
+/// How rows may be paired with images: how it is called, what to change, and for each sample the row that belongs to it.
+type Pairing = (String, String, Vec<Option<usize>>);
+
+/// The ways in which n rows may be paired.
+pub(super) fn pairings(what: &str, n: usize) -> Vec<Pairing> {
+    let mut all: Vec<_> = [1, -1, 2, -2, 3, -3]
+        .into_iter()
+        .map(|shift: isize| {
+            let (by, side) = (shift.unsigned_abs(), if shift > 0 { "early" } else { "late" });
+            let by = match by {
+                1 => "one sample".to_owned(),
+                _ => format!("{by} samples"),
+            };
+            let change =
+                format!("pair each image with the {what} {by} {}", if shift < 0 { "later" } else { "earlier" });
+            let rows = (0..n).map(|i| i.checked_add_signed(-shift).filter(|row| *row < n)).collect();
+            (format!("{what} are {by} {side}"), change, rows)
+        })
+        .collect();
+    let reversed = (0..n).rev().map(Some).collect();
+    all.push((format!("{what} are in reverse order"), format!("reverse the order of the {what}"), reversed));
+    all
+}
+
+/// The recording with the state of another sample in each; samples without one are left out.
+pub(super) fn paired(recording: &Recording, rows: &[Option<usize>]) -> Recording {
+    let samples = rows.iter().zip(&recording.samples).filter_map(|(row, sample)| {
+        let read = &recording.samples[(*row)?];
+        Some(Sample { joints: read.joints.clone(), pose: read.pose, ..sample.clone() })
+    });
+    Recording { samples: samples.collect(), ..recording.clone() }
+}
