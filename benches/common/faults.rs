@@ -115,7 +115,7 @@ pub fn targets(seed: u64, samples: usize, one_axis: bool) -> (Rig, Recording) {
         let tip = z * if on_hand { seen.inverse() } else { seen } * x.inverse();
         let mut normal = |sd: f64| Vector3::from_fn(|_, _| sd * Distribution::<f64>::sample(&StandardNormal, random));
         let noise = Pose::new(normal(0.002), normal(0.001));
-        let targets = vec![TargetDetection { camera: 0, target: "tag".into(), pose: seen * noise }];
+        let targets = vec![TargetDetection { camera: 0, target: "tag".into(), pose: seen * noise, covariance: None }];
         Sample { pose: Some(tip), targets, ..Sample::default() }
     };
     let samples = (0..samples).map(sample).collect();
