@@ -23,7 +23,8 @@ pub fn relearn(
 ) -> Result<Calibration, Error> {
     check_paths(rig, paths)?;
     let mut free: Vec<String> = paths.to_vec();
-    if rig.robot.joints.iter().all(|joint| is_free(&free, &format!("robot.joints.{}", joint.name))) {
+    let whole = |name: &str| is_free(paths, &format!("robot.joints.{name}"));
+    if !rig.robot.joints.is_empty() && rig.robot.joints.iter().all(|joint| whole(&joint.name)) {
         free.extend(["features".to_owned(), "robot.base".to_owned()]);
     }
     let mut part = rig.clone();
@@ -38,6 +39,7 @@ pub fn relearn(
         part.estimate.fixed.push("robot.base".to_owned());
     }
     check_rest(rig, &part, &free)?;
+    check_seen(&part, recording)?;
     let mut learned = calibrate(&part, recording, options, observer)?;
     learned.rig.estimate.clone_from(&rig.estimate);
     restore(&mut learned.rig, rig, &free);
@@ -121,6 +123,21 @@ fn check_rest(rig: &Rig, part: &Rig, free: &[String]) -> Result<(), Error> {
             parameter.path(rig)
         ))),
         None if rig.cameras.is_empty() && rig.features.is_empty() => Model::new(rig).map(|_| ()),
+        None => Ok(()),
+    }
+}
+
+/// A camera that is learned anew must have seen something.
+fn check_seen(part: &Rig, recording: &Recording) -> Result<(), Error> {
+    let seen = |name: &str| {
+        let is_of = |camera: u32| recording.cameras[camera as usize].name == name;
+        recording.samples.iter().any(|sample| sample.pixels.iter().any(|detection| is_of(detection.camera)))
+    };
+    match part.cameras.iter().find(|camera| camera.pose.is_none() && !seen(&camera.name)) {
+        Some(camera) => Err(Error::NotEnoughData(format!(
+            "camera `{}` is to be learned, and no sample of the recording has a detection of it",
+            camera.name
+        ))),
         None => Ok(()),
     }
 }

@@ -103,6 +103,9 @@ fn tell(diagnosis: &Diagnosis) -> String {
     if let Some(reason) = &diagnosis.unsolved {
         text += &format!("\nnothing can be learned from the data as recorded: {reason}\n");
     }
+    if diagnosis.findings.is_empty() && diagnosis.unsolved.is_none() {
+        text += "\nno mistake in units, pairing, axes or sides was found\n";
+    }
     for finding in &diagnosis.findings {
         text += &format!("\n  {}: {}\n", finding.what, finding.change);
     }

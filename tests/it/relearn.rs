@@ -97,6 +97,10 @@ fn a_path_that_names_nothing_and_too_few_samples_are_told() {
     let truth = random_rig(6, 2, 12, 6);
     let told = |paths: &[&str], samples| again(&truth, &record(&truth, samples, 6), paths).unwrap_err().to_string();
     assert!(told(&["cameras.nowhere"], 5).contains("`cameras.nowhere` names nothing"));
+    let mut blind = record(&truth, 5, 6);
+    blind.samples.iter_mut().for_each(|sample| sample.pixels.retain(|seen| seen.camera != 0));
+    let unseen = again(&truth, &blind, &["cameras.cam1"]).unwrap_err().to_string();
+    assert!(unseen.contains("camera `cam1`"), "{unseen}");
     let few = told(&["robot.joints"], 3);
     assert!(few.contains("3 samples"), "{few}");
 }
