@@ -4,7 +4,7 @@ use super::inputs::{check_output, read_recordings, read_rig};
 use super::words::count;
 use clap::Args;
 use handeye::Error;
-use handeye::online::{Event, Monitor, MonitorOptions};
+use handeye::online::{Cause, Event, Monitor, MonitorOptions};
 use handeye::rig::Rig;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -53,10 +53,17 @@ impl MonitorCommand {
             }
         }
         let watched = recording.samples.len() - skipped;
+        if watched == 0 {
+            let problem = "no sample has joints and an image with three detections of features that the rig knows";
+            return Err(Error::NotEnoughData(format!("{problem}: fewer cannot be told from wrong detections")));
+        }
         let summary = if changes == 0 { "no change".to_owned() } else { count(changes, "change") };
         text += &format!("{summary} in {}\n", count(watched, "sample"));
         if skipped > 0 {
-            text += &format!("{} without joints or without a detection to compare\n", count(skipped, "sample"));
+            text += &format!(
+                "{} without joints or without an image that has three detections to compare\n",
+                count(skipped, "sample")
+            );
         }
         let left_out = monitor.left_out().map(|cause| cause.name(&input.rig));
         if let Some(name) = &left_out {
@@ -80,6 +87,9 @@ impl MonitorCommand {
     }
 }
 
+/// Smaller probabilities are printed as this one.
+const LEAST_P: f64 = 1e-100;
+
 /// A line and an object, where something happened.
 fn tell(sample: usize, event: &Event, rig: &Rig) -> Option<(String, Value)> {
     match event {
@@ -88,11 +98,12 @@ fn tell(sample: usize, event: &Event, rig: &Rig) -> Option<(String, Value)> {
             let name = change.cause.name(rig);
             let others: Vec<String> = change.as_good().map(|cause| cause.name(rig)).collect();
             let or = if others.is_empty() { String::new() } else { format!(" (or {})", others.join(", ")) };
-            let line = format!(
-                "sample {sample}: {name}{or} moved at sample {} (p < {:.0e} of a false alarm)\n",
-                change.since,
-                change.p_value.max(f64::MIN_POSITIVE)
-            );
+            let (since, p) = (change.since, change.p_value.max(LEAST_P));
+            let what = match change.cause {
+                Cause::Unexplained => format!("more than one part, or something else, changed at sample {since}"),
+                _ => format!("{name}{or} moved at sample {since}"),
+            };
+            let line = format!("sample {sample}: {what} (p < {p:.0e} of a false alarm)\n");
             let scores: Vec<Value> = change
                 .scores
                 .iter()

@@ -37,7 +37,7 @@ impl Default for MonitorOptions {
 /// What came of a sample.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// Nothing to compare: no joints, no detection of what the rig knows, or a number that is not finite.
+    /// Nothing to compare: no joints, no image with three detections of what the rig knows, or a number that is not finite.
     Skipped,
     /// As predicted, or not yet told from it.
     Unchanged,

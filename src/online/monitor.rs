@@ -89,6 +89,9 @@ impl Monitor {
             return self.relearn(cause, samples);
         }
         let images = distances(&self.model, &seen);
+        if !Null::can_judge(&images) {
+            return Event::Skipped;
+        }
         let p = self.null.p_value(&images);
         self.recent.push_back((number, p, seen));
         let p_values: Vec<f64> = self.recent.iter().map(|(_, p, _)| *p).collect();

@@ -44,7 +44,13 @@ impl Null {
         self.location.exp()
     }
 
-    /// Bound on the probability of a sample whose images are this bad or worse. `images`: pixel distances, per camera.
+    /// Whether any image has enough detections to be judged.
+    pub fn can_judge(images: &[Vec<f64>]) -> bool {
+        measures(images).next().is_some()
+    }
+
+    /// Bound on the probability of a sample whose images are this bad or worse; one of them can be judged. `images`: pixel
+    /// distances, per camera.
     pub fn p_value(&self, images: &[Vec<f64>]) -> f64 {
         let measured: Vec<(f64, usize)> = measures(images).collect();
         let p = |&(measure, n): &(f64, usize)| {
