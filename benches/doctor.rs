@@ -6,7 +6,7 @@ use faults::Fault;
 use handeye::calibrate::Options;
 use handeye::doctor::examine;
 use handeye::recording::Recording;
-use handeye::rig::Rig;
+use handeye::rig::{Model, Rig};
 use handeye::simulate::{SimulateOptions, random_rig, simulate};
 
 fn main() {
@@ -19,7 +19,12 @@ fn main() {
     table("joints and pixels, random rig", &faults::of_joints(), trials, |seed| {
         by_joints(&random_rig(6, 2, 12, seed), seed)
     });
+    table("joints and pixels, a random rig on the move", &faults::of_dense_motion(), trials, faults::dense_motion);
     if let Some((rig, recording)) = ur3e() {
+        let tips = tips_in_place_of_joints(&rig, &recording);
+        table("ur3e-checkerboard, 25 tip poses of it", &faults::of_tips(), trials, |seed| {
+            (tips.0.clone(), part(&tips.1, seed))
+        });
         table("ur3e-checkerboard, 25 samples of it", &faults::of_joints(), trials, |seed| {
             (rig.clone(), part(&recording, seed))
         });
@@ -80,6 +85,21 @@ fn ur3e() -> Option<(Rig, Recording)> {
         });
     }
     Some((rig, recording.select(|sample| sample != 24 && sample != 25)))
+}
+
+/// The recording with the tip poses of the nominal chain.
+fn tips_in_place_of_joints(rig: &Rig, recording: &Recording) -> (Rig, Recording) {
+    let arm = Rig { cameras: Vec::new(), features: Vec::new(), ..rig.clone() };
+    let model = Model::new(&arm).expect("the chain is known");
+    let (mut rig, mut recording) = (rig.clone(), recording.clone());
+    for sample in &mut recording.samples {
+        sample.pose = sample.joints.take().map(|joints| model.tip(&joints));
+    }
+    recording.joints.clear();
+    rig.robot = handeye::rig::Robot::default();
+    rig.estimate.fixed.retain(|path| !path.starts_with("robot"));
+    rig.estimate.prior.retain(|path, _| !path.starts_with("robot"));
+    (rig, recording)
 }
 
 /// 25 samples that depend on the seed.

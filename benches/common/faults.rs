@@ -1,6 +1,7 @@
 //! Mistakes planted in recordings, and what the doctor has to say of each.
-use handeye::recording::{RecordedCamera, Recording, Sample, TargetDetection};
-use handeye::rig::{Camera, Feature, Parent, Rig};
+use handeye::recording::{Detection, RecordedCamera, Recording, Sample, TargetDetection};
+use handeye::rig::{Camera, Feature, Model, Parent, Rig};
+use handeye::simulate::{SimulateOptions, random_rig, simulate};
 use handeye::solvers::Pose;
 use handeye::solvers::manifold::so3;
 use nalgebra::Vector3;
@@ -57,14 +58,28 @@ pub fn of_joints() -> Vec<Fault> {
                 recording.samples[n - 1 - i] = recording.samples[i].clone();
             }
         }),
+        fault("one joint moves", "moves", |_, recording| {
+            let first = recording.samples[0].joints.clone().expect("joints are recorded");
+            for joints in recording.samples.iter_mut().flat_map(|sample| &mut sample.joints) {
+                let last = joints.len() - 1;
+                joints[..last].copy_from_slice(&first[..last]);
+            }
+        }),
+    ]
+}
+
+/// Mistakes of recordings in which the arm moves on between images.
+pub fn of_dense_motion() -> Vec<Fault> {
+    let fault = |name, says, plant| Fault { name, says, plant };
+    vec![
+        fault("joints 0.13 s late", "s too late", |_, recording| lag(recording, 0.13)),
+        fault("joints 0.04 s early", "s too early", |_, recording| lag(recording, -0.04)),
     ]
 }
 
 /// Mistakes of recordings with tip poses and pixels.
 pub fn of_tips() -> Vec<Fault> {
-    let mut all: Vec<Fault> = of_targets().into_iter().filter(|fault| fault.name.starts_with("robot")).collect();
-    all.retain(|fault| fault.name != "robot rows swapped");
-    all
+    of_targets().into_iter().filter(|fault| fault.name.starts_with("robot")).collect()
 }
 
 /// Mistakes of recordings with targets and tip poses.
@@ -92,6 +107,14 @@ pub fn of_targets() -> Vec<Fault> {
             for i in 0..n / 3 {
                 recording.samples[n - 1 - i] = recording.samples[i].clone();
             }
+        }),
+        fault("robot turns about one axis", "all rotations are about one axis of the tip: (", |_, recording| {
+            let first = recording.samples[0].pose.expect("poses are recorded").rotation;
+            let mut angle = 0.0;
+            robot(recording, |pose| {
+                angle += 0.3;
+                Pose { rotation: first * so3::exp(&Vector3::new(0.0, 0.0, angle)), ..*pose }
+            });
         }),
     ]
 }
@@ -143,7 +166,67 @@ fn rows(recording: &mut Recording, from: impl Fn(usize, usize) -> usize) {
     }
 }
 
-fn robot(recording: &mut Recording, change: impl Fn(&Pose) -> Pose) {
+/// Stamps the joints so many seconds late: each sample gets those of an earlier time, linear between samples.
+fn lag(recording: &mut Recording, seconds: f64) {
+    let samples = recording.samples.clone();
+    let at = |time: f64| {
+        let after = samples.partition_point(|sample| sample.time < Some(time)).clamp(1, samples.len() - 1);
+        let [a, b] = [&samples[after - 1], &samples[after]];
+        let (from, to) = (a.time?, b.time?);
+        let share = ((time - from) / (to - from)).clamp(0.0, 1.0);
+        let pairs = a.joints.as_ref()?.iter().zip(b.joints.as_ref()?);
+        Some(pairs.map(|(a, b)| a + share * (b - a)).collect())
+    };
+    for sample in &mut recording.samples {
+        sample.joints = sample.time.and_then(|time| at(time - seconds));
+    }
+    // Samples before the first reading have none.
+    recording.samples.retain(|sample| {
+        let read = sample.time.unwrap_or_default() - seconds;
+        samples[0].time <= Some(read) && Some(read) <= samples[samples.len() - 1].time
+    });
+}
+
+/// A random rig's arm on its way through random positions, ten images a second with 0.3 px of noise; nothing known but intrinsics.
+pub fn dense_motion(seed: u64) -> (Rig, Recording) {
+    const STEPS: usize = 10;
+    let rig = random_rig(6, 2, 12, seed);
+    let options = SimulateOptions { samples: 16, seed, ..SimulateOptions::default() };
+    let mut recording = simulate(&rig, &options).expect("the rig is in view").recording;
+    let stops: Vec<Vec<f64>> = recording.samples.iter().flat_map(|sample| sample.joints.clone()).collect();
+    let model = Model::new(&rig).expect("the rig is complete");
+    let random = &mut ChaCha8Rng::seed_from_u64(seed);
+    recording.samples.clear();
+    for index in 0..STEPS * (stops.len() - 1) {
+        let [from, to] = [&stops[index / STEPS], &stops[index / STEPS + 1]];
+        let share = (index % STEPS) as f64 / STEPS as f64;
+        let share = share * share * (3.0 - 2.0 * share);
+        let joints: Vec<f64> = from.iter().zip(to).map(|(a, b)| a + share * (b - a)).collect();
+        let links = model.links(&joints);
+        let mut pixels = Vec::new();
+        for (camera, size) in recording.cameras.iter().map(|camera| camera.size).enumerate() {
+            for feature in 0..recording.features.len() {
+                let index = rig.features.iter().position(|known| known.name == recording.features[feature]);
+                let pixel = model.pixel(camera, index.expect("every feature is the rig's"), &links);
+                let pixel = pixel.map(|x| x + 0.3 * Distribution::<f64>::sample(&StandardNormal, random));
+                let [width, height] = size.unwrap_or([640, 480]).map(f64::from);
+                if (0.0..width).contains(&pixel[0]) && (0.0..height).contains(&pixel[1]) {
+                    pixels.push(Detection { camera: camera as u32, feature: feature as u32, pixel });
+                }
+            }
+        }
+        recording.samples.push(Sample {
+            time: Some(0.1 * index as f64),
+            joints: Some(joints),
+            pixels,
+            ..Sample::default()
+        });
+    }
+    (Rig::default(), recording)
+}
+
+fn robot(recording: &mut Recording, change: impl FnMut(&Pose) -> Pose) {
+    let mut change = change;
     recording.samples.iter_mut().for_each(|sample| sample.pose = sample.pose.map(|pose| change(&pose)));
 }
 

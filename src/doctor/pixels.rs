@@ -33,7 +33,6 @@ pub(super) fn examine(rig: &Rig, recording: &Recording, options: &calibrate::Opt
         }
     };
     diagnosis.scores.push(Score { alternative: "as recorded".into(), misfit: as_recorded });
-    diagnosis.findings.extend(found.iter().filter_map(swapped));
 
     // What free intrinsics can hide shows where they are held.
     let held = images::held(rig, recording);
@@ -85,7 +84,11 @@ pub(super) fn examine(rig: &Rig, recording: &Recording, options: &calibrate::Opt
             }
         }
     }
-    diagnosis.findings.extend(best.map(|(_, finding)| finding));
+    match best {
+        Some((_, finding)) => diagnosis.findings.push(finding),
+        // Single rows are judged by a fit, which says nothing where all of the data are wrong.
+        None => diagnosis.findings.extend(found.iter().filter_map(|unfit| swapped(unfit, recording))),
+    }
 }
 
 fn consider(
@@ -104,12 +107,14 @@ fn consider(
     }
 }
 
-/// Rows of joints that the calibration itself found to be exchanged.
-fn swapped(unfit: &Unfit) -> Option<Finding> {
+/// Rows of joints or tip poses that the calibration itself found to be exchanged.
+fn swapped(unfit: &Unfit, recording: &Recording) -> Option<Finding> {
     let Unfit::WrongJoints { sample, swapped_with: Some(other), .. } = unfit else { return None };
+    let has_joints = recording.samples.get(*sample).is_some_and(|sample| sample.joints.is_some());
+    let (rows, read) = if has_joints { ("joint rows", "joints") } else { ("robot poses", "robot poses") };
     (sample < other).then(|| {
-        let what = format!("the joint rows of samples {sample} and {other} are swapped");
-        finding(&what, "exchange the joints of the two samples")
+        let what = format!("the {rows} of samples {sample} and {other} are swapped");
+        finding(&what, &format!("exchange the {read} of the two samples"))
     })
 }
 

@@ -88,15 +88,16 @@ mistakes_of_pixels! {
     swapped_principal_points_are_found: of_joints, "cx, cy swapped";
     cameras_declared_on_the_hand_are_found: of_joints, "declared on the hand";
     repeated_samples_are_found: of_joints, "samples repeat";
+    two_swapped_tip_poses_are_found: of_tips, "robot rows swapped";
+    a_single_moving_joint_is_found: of_joints, "one joint moves";
 }
 
+/// Clock lags of more and of less than a sample period.
 #[test]
-fn one_moving_joint_is_found() {
-    let (rig, mut recording) = pixels(1, true);
-    let first = recording.samples[0].joints.clone().unwrap();
-    for sample in &mut recording.samples {
-        let joints = sample.joints.as_mut().unwrap();
-        joints[..5].copy_from_slice(&first[..5]);
+fn joints_that_are_stamped_late_or_early_are_found_and_nothing_is_in_clean_motion() {
+    let (rig, recording) = faults::dense_motion(1);
+    assert_eq!(found(&rig, &recording), Vec::<String>::new());
+    for fault in faults::of_dense_motion() {
+        is_found(&fault, faults::dense_motion(1), 1);
     }
-    assert!(found(&rig, &recording).contains(&"only joint j6 moves".to_owned()));
 }
