@@ -7,6 +7,7 @@ mod deviations;
 mod doctor;
 mod experiments;
 mod folds;
+mod infer;
 mod influence;
 mod learning;
 mod malformed_input;
