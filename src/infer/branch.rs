@@ -1,7 +1,6 @@
 //! Branches: the minima that joints were found at, with covariance, open directions and probability.
 use super::information::Information;
 use super::pixel_error::PixelError;
-use super::prior::Prior;
 use handeye_solvers::Pose;
 use nalgebra::DMatrix;
 
@@ -34,8 +33,10 @@ pub(super) struct Minimum {
     squares: f64,
     /// Of the pixels alone.
     pub pixels: f64,
-    /// With that of the readings.
-    cost: f64,
+    /// The whole cost there, of pixels, readings and beliefs.
+    pub misfit: f64,
+    /// -ln of what its probability is in proportion to, but for the volume.
+    pub cost: f64,
 }
 
 /// Branches less probable than this are left out.
@@ -45,7 +46,7 @@ impl Minimum {
     /// Where `error` has looked last. `information`: what was known there beside the pixels, `open`: what it alone determines.
     pub fn new(
         error: &PixelError,
-        prior: &Prior,
+        misfit: f64,
         joints: Vec<f64>,
         (information, open): (&Information, Vec<Vec<f64>>),
     ) -> Self {
@@ -55,9 +56,17 @@ impl Minimum {
             open,
             squares: error.squares,
             pixels: error.pixels,
-            cost: error.pixels + prior.cost(&joints),
+            misfit,
+            cost: misfit,
             joints,
         }
+    }
+
+    /// Takes over the probability of another that is the same.
+    pub fn merge(&mut self, other: &Minimum) {
+        let (least, most) = (self.cost.min(other.cost), self.cost.max(other.cost));
+        self.misfit = self.misfit.min(other.misfit);
+        self.cost = least - (least - most).exp().ln_1p();
     }
 
     /// Minima that differ by less are one [rad or m].

@@ -1,13 +1,11 @@
 //! Joints from pixels: every branch that explains them, with covariance and probability.
 use super::Sighting;
 use super::branch::{Branch, Minimum, branches};
-use super::information::Information;
 use super::inverse::{InverseKinematics, InverseOptions};
 use super::joint_box::JointBox;
 use super::pixel_error::PixelError;
 use super::pose::{InferredPose, is_plausible, poses};
 use super::prior::Prior;
-use super::starts::Starts;
 use super::views::Views;
 use crate::Error;
 use crate::chain::JointChain;
@@ -37,24 +35,16 @@ impl Default for InferOptions {
 /// only (Huber).
 #[derive(Clone, Debug)]
 pub struct Inference {
-    options: InferOptions,
-    chain: JointChain,
-    views: Views,
-    limits: JointBox,
-    sigma: f64,
+    pub(super) options: InferOptions,
+    pub(super) chain: JointChain,
+    pub(super) views: Views,
+    pub(super) limits: JointBox,
+    pub(super) sigma: f64,
+    pub(super) action_sd: f64,
     inverse: InverseKinematics,
-    error: PixelError,
-    trial: Vec<f64>,
+    pub(super) error: PixelError,
+    pub(super) trial: Vec<f64>,
 }
-
-/// Most Levenberg-Marquardt iterations from one start.
-const ITERATIONS: usize = 40;
-
-/// Relative decrease of the cost at which they stop.
-const CONVERGED: f64 = 1e-10;
-
-/// A start far from the solution is given up where this many iterations have not halved its cost.
-const PATIENCE: usize = 6;
 
 /// The inverse kinematics stops within this many standard deviations of the pose: refining in pixels does the rest.
 const TOLERANCE: f64 = 5.0;
@@ -71,6 +61,7 @@ impl Inference {
             chain: model.joint_chain(),
             views: Views::new(&model),
             limits: JointBox::new(rig),
+            action_sd: rig.noise.joint_action,
             sigma: if rig.noise.pixels > 0.0 { rig.noise.pixels } else { EXACT },
             inverse: InverseKinematics::new(rig, inverse)?,
             error: PixelError::default(),
@@ -146,12 +137,18 @@ impl Inference {
     }
 
     /// Those that some joint moves.
-    fn telling(&self, sightings: &[Sighting], prior: &Prior) -> Result<Vec<Sighting>, Error> {
+    pub(super) fn moved(&self, sightings: &[Sighting]) -> Vec<Sighting> {
         let mut seen = self.known(sightings);
         seen.retain(|sighting| {
             let (from, to) = self.views.between(sighting);
             from < to
         });
+        seen
+    }
+
+    /// The same; fails where there is none, and nothing else is known.
+    fn telling(&self, sightings: &[Sighting], prior: &Prior) -> Result<Vec<Sighting>, Error> {
+        let seen = self.moved(sightings);
         if seen.is_empty() && !prior.is_given() {
             return Err(Error::NotEnoughData(
                 "nothing that the joints move was seen: no detection of a feature and a camera of the rig that a joint is between"
@@ -159,90 +156,6 @@ impl Inference {
             ));
         }
         Ok(seen)
-    }
-
-    /// Starts all over the limits, refined in pixels.
-    fn search(&mut self, minima: &mut Vec<Minimum>, seen: &[Sighting], information: &Information, prior: &Prior) {
-        let n = self.chain.len();
-        let mut starts = Starts::new(n, self.options.seed);
-        for _ in 0..self.options.pixel_starts {
-            let mut start = vec![0.0; n];
-            starts.next(&self.limits, &mut start);
-            self.add(minima, seen, information, prior, start);
-        }
-    }
-
-    /// Adds where a start leads to, if it is new.
-    fn add(
-        &mut self,
-        minima: &mut Vec<Minimum>,
-        seen: &[Sighting],
-        information: &Information,
-        prior: &Prior,
-        start: Vec<f64>,
-    ) {
-        let Some(minimum) = self.refine(seen, information, prior, start, true) else { return };
-        if minima.iter().all(|other| self.limits.distance(&other.joints, &minimum.joints) > other.apart()) {
-            minima.push(minimum);
-        }
-    }
-
-    /// The minimum that a start leads to. `None` where the search breaks down, or, `hasty`, is slow.
-    fn refine(
-        &mut self,
-        seen: &[Sighting],
-        information: &Information,
-        prior: &Prior,
-        mut joints: Vec<f64>,
-        hasty: bool,
-    ) -> Option<Minimum> {
-        self.limits.bring_inside(&mut joints, &information.mean);
-        self.descend(seen, information, &mut joints, hasty)?;
-        // Once more without what the limits say of directions that the pixels determine.
-        let (settled, open) = information.settled(&self.error.square());
-        self.descend(seen, &settled, &mut joints, hasty)?;
-        self.limits.bring_inside(&mut joints, &information.mean);
-        let cost = self.error.look((&self.chain, &self.views), (seen, self.sigma), &settled, &joints);
-        cost.is_finite().then(|| Minimum::new(&self.error, prior, joints, (&settled, open)))
-    }
-
-    /// Levenberg-Marquardt in pixels inside the limits.
-    fn descend(
-        &mut self,
-        seen: &[Sighting],
-        information: &Information,
-        joints: &mut Vec<f64>,
-        hasty: bool,
-    ) -> Option<()> {
-        let Inference { chain, views, limits, sigma, error, trial, .. } = self;
-        let mut cost = error.look((chain, views), (seen, *sigma), information, joints);
-        let (mut lambda, mut mark, mut marked) = (1e-6, cost, 0);
-        for iteration in 0..ITERATIONS {
-            let step = error.step(limits, joints, lambda)?;
-            trial.clear();
-            trial.extend(joints.iter().zip(step).map(|(joint, s)| joint + s));
-            let tried = error.look((chain, views), (seen, *sigma), information, trial);
-            let change = cost - tried;
-            if change > -CONVERGED * (1.0 + cost) {
-                std::mem::swap(joints, trial);
-                (cost, lambda) = (tried, (0.1 * lambda).max(1e-9));
-                if change < CONVERGED * (1.0 + cost) {
-                    break;
-                }
-            } else {
-                lambda = (10.0 * lambda).max(1e-3);
-                error.look((chain, views), (seen, *sigma), information, joints);
-                if lambda > 1e6 {
-                    break;
-                }
-            }
-            if cost < 0.5 * mark {
-                (mark, marked) = (cost, iteration);
-            } else if hasty && iteration - marked >= PATIENCE && !is_plausible(cost, 2.0 * seen.len() as f64) {
-                return None;
-            }
-        }
-        Some(())
     }
 }
 
