@@ -1,5 +1,6 @@
 //! A pixel and its derivatives by the point, for loops that know the camera.
-use super::{CameraModel, PARAMETERS};
+use super::{CameraModel, PARAMETERS, perspective};
+use handeye_solvers::Scalar;
 use handeye_solvers::scalar::{Dual, derivatives, seed};
 use nalgebra::Vector3;
 
@@ -12,15 +13,16 @@ impl CameraModel {
         point_in_camera: &Vector3<f64>,
     ) -> ([f64; 2], [Vector3<f64>; 2]) {
         let [fx, fy, cx, cy, distortion @ ..] = parameters;
+        if self == CameraModel::Pinhole && perspective::keeps_depth(point_in_camera) {
+            let inverse = 1.0 / point_in_camera.z;
+            let (x, y) = (point_in_camera.x * inverse, point_in_camera.y * inverse);
+            let (p, q) = (fx * inverse, fy * inverse);
+            let rows = [Vector3::new(p, 0.0, -p * x), Vector3::new(0.0, q, -q * y)];
+            return ([fx * x + cx, fy * y + cy], rows);
+        }
         let point = Vector3::from_fn(|i, _| seed::<3>(point_in_camera[i], i));
-        let ([x, y], [by_x, by_y]) = {
-            let seen = if self == CameraModel::Pinhole {
-                self.lens(&[], &point)
-            } else {
-                self.lens(&distortion.map(Dual::<3>::from), &point)
-            };
-            (seen.map(|value| handeye_solvers::Scalar::value(&value)), seen.map(|value| derivatives(&value)))
-        };
+        let seen = self.lens(&distortion.map(Dual::<3>::from), &point);
+        let ([x, y], [by_x, by_y]) = (seen.map(|value| value.value()), seen.map(|value| derivatives(&value)));
         ([fx * x + cx, fy * y + cy], [Vector3::from(by_x) * *fx, Vector3::from(by_y) * *fy])
     }
 }

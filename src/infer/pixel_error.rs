@@ -6,7 +6,7 @@ use super::joint_box::JointBox;
 use super::views::Views;
 use crate::chain::{JointChain, Posture};
 use handeye_solvers::Pose;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector3};
 
 /// Whitened pixel distance from which a detection counts in proportion to its distance only (Huber): one in 90 lies further out by
 /// chance, 3 σ on an axis.
@@ -22,6 +22,7 @@ pub(super) const HUBER: f64 = 3.0;
 pub(super) struct PixelError {
     posture: Posture,
     cameras: Vec<Pose>,
+    screws: Vec<(Vector3<f64>, Vector3<f64>)>,
     /// Of the pixels alone, by rows; the lower triangle is filled.
     hessian: Vec<f64>,
     gradient: Vec<f64>,
@@ -52,6 +53,9 @@ impl PixelError {
         let frame = |depth: usize| (depth > 0).then(|| &links[depth]);
         self.cameras
             .extend(views.cameras.iter().map(|view| frame(view.depth).map_or(view.pose, |link| *link * view.pose)));
+        // Motion of the world's origin with each joint, so that a point p moves by w × p + m.
+        self.screws.clear();
+        self.screws.extend(self.posture.axes.iter().map(|axis| axis.twist(&Vector3::zeros())));
         self.hessian.clear();
         self.hessian.resize(n * n, 0.0);
         self.gradient.clear();
@@ -71,12 +75,14 @@ impl PixelError {
             let (from, to) = views.between(sighting);
             let scale = weight * inverse * inverse;
             let sign = if depth == to { 1.0 } else { -1.0 };
+            let [first, second] = &mut self.rows;
+            let [a, b] = glance.rows.map(|row| row * sign);
+            let (turn_a, turn_b) = (glance.point.cross(&a), glance.point.cross(&b));
             for i in from..to {
-                let (_, v) = self.posture.axes[i].twist(&glance.point);
-                self.rows[0][i] = sign * glance.rows[0].dot(&v);
-                self.rows[1][i] = sign * glance.rows[1].dot(&v);
+                let (w, m) = &self.screws[i];
+                first[i] = turn_a.dot(w) + a.dot(m);
+                second[i] = turn_b.dot(w) + b.dot(m);
             }
-            let [first, second] = &self.rows;
             for i in from..to {
                 let (a, b) = (scale * first[i], scale * second[i]);
                 self.gradient[i] -= a * glance.error[0] + b * glance.error[1];
@@ -112,6 +118,11 @@ impl PixelError {
         let mean = (0..n).map(|i| self.total[i * n + i]).sum::<f64>() / n.max(1) as f64;
         let solved = self.program.solve(&self.total, &self.gradient, lambda * mean, &self.lower, &self.upper);
         solved.then_some(&self.program.step)
+    }
+
+    /// How much of the cost the last step takes away, if all is as linear as it seems.
+    pub fn expected_decrease(&self) -> f64 {
+        0.5 * self.gradient.iter().zip(&self.program.step).map(|(g, s)| g * s).sum::<f64>()
     }
 
     /// Gauss-Newton matrix of the pixels alone, where [`PixelError::look`] was.

@@ -27,6 +27,9 @@ const ITERATIONS: usize = 25;
 /// Relative decrease of the cost at which refining stops: the cost is then within a millionth of a standard deviation.
 const CONVERGED: f64 = 1e-10;
 
+/// Expected decrease of the cost at which a last step is taken unseen: it is shorter than 1e-5 standard deviations.
+const ARRIVED: f64 = 1e-10;
+
 /// Poses with costs this far above the least are not worth mentioning: their probability is under 1e-8.
 const HOPELESS: f64 = 20.0;
 
@@ -165,6 +168,10 @@ impl Problem<'_> {
                 rotation: so3::renormalize(&(so3::exp(&step.fixed_rows::<3>(0).into_owned()) * pose.rotation)),
                 translation: pose.translation + step.fixed_rows::<3>(3),
             };
+            if 0.5 * normal.gradient.dot(&step) < ARRIVED {
+                pose = next;
+                break;
+            }
             let tried = self.look(&next);
             let change = normal.cost - tried.cost;
             if change > 0.0 {

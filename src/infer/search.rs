@@ -13,6 +13,9 @@ const ITERATIONS: usize = 40;
 /// Relative decrease of the cost at which they stop.
 const CONVERGED: f64 = 1e-10;
 
+/// Expected decrease of the cost at which a last step is taken unseen: it is shorter than 1e-5 standard deviations.
+const ARRIVED: f64 = 1e-10;
+
 /// A start far from the solution is given up where this many iterations have not halved its cost.
 const PATIENCE: usize = 6;
 
@@ -103,6 +106,10 @@ impl Inference {
             let step = error.step(limits, joints, lambda)?;
             trial.clear();
             trial.extend(joints.iter().zip(step).map(|(joint, s)| joint + s));
+            if error.expected_decrease() < ARRIVED {
+                std::mem::swap(joints, trial);
+                break;
+            }
             let tried = error.look((chain, views), (seen, *sigma), information, trial);
             let change = cost - tried;
             if change > -CONVERGED * (1.0 + cost) {

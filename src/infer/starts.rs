@@ -17,7 +17,7 @@ impl Starts {
     pub fn new(n: usize, seed: u64) -> Self {
         // The fixed point of φ = (1 + φ)^(1 / (n + 1)).
         let power = 1.0 / (n + 1) as f64;
-        let phi = (0..40).fold(1.5_f64, |phi, _| (1.0 + phi).powf(power));
+        let phi = (0..16).fold(1.5_f64, |phi, _| (1.0 + phi).powf(power));
         let shift = (seed as f64 * 0.618_033_988_749_895).fract();
         Starts { phi, shift, count: 0 }
     }
