@@ -125,12 +125,13 @@ impl Queries {
             let other = black_box(&model.base);
             black_box(tip.angle_to(other).powi(2) + (tip.translation - other.translation).norm_squared());
         });
-        let by_kinematics = time_of(kinematics_graph(model, joints, &tip));
-        let by_camera_feature = time_of(image_graph(model, sightings, *sigma, None, &tip));
-        let by_all = time_of(image_graph(model, sightings, *sigma, Some(joints), &tip));
+        // Before the graphs: their kernels leave wide vector registers in use, which slows down what follows.
         let pose = time(|| {
             black_box(inference.poses(black_box(sightings)));
         });
+        let by_kinematics = time_of(kinematics_graph(model, joints, &tip));
+        let by_camera_feature = time_of(image_graph(model, sightings, *sigma, None, &tip));
+        let by_all = time_of(image_graph(model, sightings, *sigma, Some(joints), &tip));
         let joints_from_pose = time(|| {
             black_box(inverse.solve(black_box(&tip), start));
         });
