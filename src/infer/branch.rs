@@ -84,6 +84,7 @@ pub(super) fn branches(minima: Vec<Minimum>, seen: usize) -> Vec<Branch> {
         let volume = factor.as_ref().map_or(0.0, |factor| 1.0 / factor.l_dirty().diagonal().product());
         let unknown = || DMatrix::from_diagonal_element(n, n, f64::INFINITY);
         let covariance = factor.map_or_else(unknown, |factor| factor.inverse());
+        let covariance = (&covariance + covariance.transpose()) * 0.5;
         Branch {
             open: minimum.open,
             covariance,

@@ -19,6 +19,14 @@ impl Information {
         DMatrix::from_row_slice(self.mean.len(), self.mean.len(), &self.matrix)
     }
 
+    /// The same without limits.
+    pub fn readings(&self) -> Information {
+        let n = self.mean.len();
+        let mut readings = Information { weak: vec![0.0; n], ..self.clone() };
+        self.weak.iter().enumerate().for_each(|(i, weak)| readings.matrix[i * n + i] -= weak);
+        readings
+    }
+
     /// The same with limits counting in open directions alone, and those directions; `hessian`: H of the pixels.
     ///
     /// Directions v with vᵀ H v < vᵀ W v are open; with vᵀ W v = 1 and P = Σ v vᵀ W the projection onto them along the others, what

@@ -63,11 +63,11 @@ impl Inference {
     ) -> Option<Minimum> {
         self.limits.bring_inside(&mut joints, &information.mean);
         self.descend(seen, information, &mut joints, hasty)?;
-        // Once more without what the limits say of directions that the pixels determine.
-        let (settled, open) = information.settled(&self.error.square());
-        self.descend(seen, &settled, &mut joints, hasty)?;
+        // Once more without what limits say, which moves what the pixels determine and leaves the rest where it is.
+        self.descend(seen, &information.readings(), &mut joints, hasty)?;
         self.limits.bring_inside(&mut joints, &information.mean);
-        let cost = self.error.look((&self.chain, &self.views), (seen, self.sigma), &settled, &joints);
+        let cost = self.error.look((&self.chain, &self.views), (seen, self.sigma), information, &joints);
+        let (settled, open) = information.settled(&self.error.square());
         let known = self.error.pixels + prior.cost(&joints);
         cost.is_finite().then(|| Minimum::new(&self.error, known, joints, (&settled, open)))
     }

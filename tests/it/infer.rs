@@ -6,14 +6,14 @@ use handeye::solvers::manifold::so3;
 use nalgebra::{DVector, Vector6};
 
 /// Sightings with noise, and the true joints, of random motions of a rig.
-fn record(rig: &Rig, samples: usize, seed: u64) -> Vec<(Vec<Sighting>, Vec<f64>)> {
+pub fn record(rig: &Rig, samples: usize, seed: u64) -> Vec<(Vec<Sighting>, Vec<f64>)> {
     let simulation = simulate(rig, &SimulateOptions { samples, seed, ..SimulateOptions::default() }).unwrap();
     let names = Names::new(rig, &simulation.recording);
     let samples = simulation.recording.samples.iter().zip(&simulation.truth.samples);
     samples.map(|(seen, truth)| (names.sightings(seen), truth.joints.clone().unwrap())).collect()
 }
 
-fn inference(rig: &Rig) -> Inference {
+pub fn inference(rig: &Rig) -> Inference {
     Inference::new(rig, InferOptions::default()).unwrap()
 }
 
@@ -26,12 +26,12 @@ fn turning() -> Rig {
     rig
 }
 
-fn wrap(angle: f64) -> f64 {
+pub fn wrap(angle: f64) -> f64 {
     angle - std::f64::consts::TAU * (angle / std::f64::consts::TAU).round()
 }
 
 /// χ² of n numbers with mean n and variance 2 n: within 4 standard deviations.
-fn follows_chi_square(sum: f64, freedom: usize) {
+pub fn follows_chi_square(sum: f64, freedom: usize) {
     let n = freedom as f64;
     assert!((sum - n).abs() < 4.0 * (2.0 * n).sqrt(), "χ² is {sum}, {n} are expected");
 }

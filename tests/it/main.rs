@@ -8,6 +8,7 @@ mod doctor;
 mod experiments;
 mod folds;
 mod infer;
+mod infer_rigs;
 mod influence;
 mod learning;
 mod malformed_input;
