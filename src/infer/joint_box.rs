@@ -12,7 +12,12 @@ pub(crate) struct JointBox {
     pub upper: Vec<f64>,
     /// True where the joint comes round again.
     pub turns: Vec<bool>,
+    /// Where the joints were while the rig was learned; empty where nobody knows.
+    learned: Vec<[f64; 2]>,
 }
+
+/// Least standard deviation of a joint outside the range in which the rig was learned [rad or m].
+const NARROW: f64 = 0.05;
 
 /// Half the range that starts of a sliding joint without limits are drawn from [m].
 const SLIDE: f64 = 1.0;
@@ -27,7 +32,8 @@ impl JointBox {
             joint.kind == JointKind::Revolute && upper[i] - lower[i] >= TAU - 1e-9
         };
         let turns = joints.iter().enumerate().map(comes_round).collect();
-        JointBox { lower, upper, turns }
+        let learned = rig.fit.as_ref().map_or_else(Vec::new, |fit| fit.joints.clone());
+        JointBox { lower, upper, turns, learned }
     }
 
     pub fn len(&self) -> usize {
@@ -71,6 +77,23 @@ impl JointBox {
             (false, true) => (self.upper[joint] - 2.0 * SLIDE, self.upper[joint]),
             (false, false) => (-SLIDE, SLIDE),
         }
+    }
+
+    /// Where a joint is expected while nothing else is known: in the middle of where it was, or may be.
+    pub fn middle(&self, joint: usize) -> f64 {
+        let (lower, upper) = self.learned.get(joint).map_or_else(|| self.range(joint), |range| (range[0], range[1]));
+        0.5 * (lower + upper)
+    }
+
+    /// -ln of how probable it is to find a joint so far out of where it was while the rig was learned: even inside, Gaussian outside
+    /// with a quarter of the range for its standard deviation. A rig learned from nothing has no limits, and its arm a branch in
+    /// which it moved.
+    pub fn strangeness(&self, joint: usize, reading: f64) -> f64 {
+        let Some(&[lower, upper]) = self.learned.get(joint) else { return 0.0 };
+        let (half, middle) = (0.5 * (upper - lower), 0.5 * (lower + upper));
+        let off = if self.turns[joint] { wrap(reading - middle) } else { reading - middle };
+        let outside = (off.abs() - half).max(0.0);
+        0.5 * (outside / (0.5 * half).max(NARROW)).powi(2)
     }
 
     /// Largest difference of two readings, whole turns apart being none where they come round [rad or m].

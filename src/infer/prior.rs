@@ -47,13 +47,13 @@ impl Prior {
         Ok(())
     }
 
-    /// Its mean, or the middle of the limits; and where nothing else is said, the spread of joints anywhere inside the limits.
+    /// Its mean, or the middle of where the rig was learned or of the limits; and where nothing else is said, the spread of joints anywhere inside the limits.
     pub(super) fn information(&self, limits: &JointBox) -> Information {
         let n = limits.len();
         let mut information = Information { matrix: vec![0.0; n * n], ..Information::default() };
         for i in 0..n {
             let (lower, upper) = limits.range(i);
-            information.mean.push(self.mean.get(i).copied().unwrap_or(0.5 * (lower + upper)));
+            information.mean.push(self.mean.get(i).copied().unwrap_or_else(|| limits.middle(i)));
             let anywhere = ((upper - lower) / 12.0_f64.sqrt()).max(1e-6);
             let read = self.sd.get(i).copied().filter(|sd| sd.is_finite());
             let sd = read.unwrap_or(anywhere);
@@ -63,9 +63,13 @@ impl Prior {
         information
     }
 
-    /// Half the squared distance of joints from the readings, of those that are readings.
-    pub(super) fn cost(&self, joints: &[f64]) -> f64 {
-        let terms = joints.iter().zip(&self.mean).zip(&self.sd);
-        terms.map(|((joint, mean), sd)| 0.5 * ((joint - mean) / sd).powi(2)).sum()
+    /// -ln of the density of joints, of those that are read by their readings and of the others by where the rig was learned; but for
+    /// a constant.
+    pub(super) fn cost(&self, joints: &[f64], limits: &JointBox) -> f64 {
+        let term = |(i, joint): (usize, &f64)| match (self.mean.get(i), self.sd.get(i)) {
+            (Some(mean), Some(sd)) if sd.is_finite() => 0.5 * ((joint - mean) / sd).powi(2),
+            _ => limits.strangeness(i, *joint),
+        };
+        joints.iter().enumerate().map(term).sum()
     }
 }

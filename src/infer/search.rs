@@ -68,7 +68,7 @@ impl Inference {
         self.limits.bring_inside(&mut joints, &information.mean);
         let cost = self.error.look((&self.chain, &self.views), (seen, self.sigma), information, &joints);
         let (settled, open) = information.settled(&self.error.square());
-        let known = self.error.pixels + prior.cost(&joints);
+        let known = self.error.pixels + prior.cost(&joints, &self.limits);
         cost.is_finite().then(|| Minimum::new(&self.error, known, joints, (&settled, open)))
     }
 
