@@ -1,16 +1,13 @@
 //! What is inferred with rigs of every kind: few and many joints, sliding ones, cameras on the hand, features on any link; with
 //! cameras and features missing, and with too few of them.
 use crate::infer::{follows_chi_square, inference, record, wrap};
+use crate::learning::variants;
 use handeye::chain::JointKind;
 use handeye::infer::{Branch, Inference, Moment, Prior, Sighting};
 use handeye::rig::{Model, Rig, catalog};
 use handeye::simulate::random_rig;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
-
-#[allow(dead_code)] // Shared with benches that use the rest of it.
-#[path = "../../benches/common/variants.rs"]
-mod variants;
 
 /// Every revolute joint may turn by 2π to either side.
 fn unlimited(mut rig: Rig) -> Rig {
@@ -110,7 +107,8 @@ fn rigs_of_every_kind_have_the_truth_among_their_branches_and_inside_their_covar
 fn a_missing_camera_or_feature_widens_the_covariance_and_nothing_else() {
     let rig = catalog::rig("ur5").unwrap();
     let mut inference = inference(&rig);
-    let fewer: [(&str, fn(&Sighting) -> bool); 4] = [
+    type Keep = fn(&Sighting) -> bool;
+    let fewer: [(&str, Keep); 4] = [
         ("all", |_| true),
         ("one camera", |sighting| sighting.camera == 0),
         ("four features", |sighting| sighting.feature < 4),
