@@ -20,8 +20,11 @@ const EIGENVECTORS: usize = 4;
 /// Two rotations closer than this (Frobenius norm) are one solution.
 pub(super) const SAME: f64 = 1e-3;
 
+/// A descent that comes so near to a minimum (Frobenius norm, 4°) ends there.
+const NEAR: f64 = 0.1;
+
 /// Squared step [rad²] at which a descent has arrived.
-const ARRIVED: f64 = 1e-14;
+const ARRIVED: f64 = 1e-10;
 
 /// Least eigenvalue, relative to the mean one, that the linear solution is not disturbed by.
 const RIDGE: f64 = 1e-6;
@@ -86,7 +89,7 @@ impl ObjectSpace {
     pub fn minima(&self) -> Vec<Matrix3<f64>> {
         let mut found: Vec<Matrix3<f64>> = Vec::new();
         for start in self.starts() {
-            let Some(minimum) = self.descend(start) else { continue };
+            let Some(minimum) = self.descend(start, &found) else { continue };
             if found.iter().all(|other| (other - minimum).norm() > SAME) {
                 found.push(minimum);
             }
@@ -100,7 +103,7 @@ impl ObjectSpace {
         let ridge = RIDGE * self.omega.trace() / 9.0;
         let r = -(self.omega + Matrix9::identity() * ridge).cholesky()?.solve(&self.beta);
         let start = nearest_rotation(&Matrix3::from_column_slice(r.as_slice()))?;
-        self.descend(start)
+        self.descend(start, &[])
     }
 
     /// The rotations nearest to the flattest directions of Ω, then the 24 of a cube: none is farther than 63° from one.
@@ -123,8 +126,8 @@ impl ObjectSpace {
         starts
     }
 
-    /// Levenberg-Marquardt on SO(3); `None` where it does not arrive.
-    fn descend(&self, mut rotation: Matrix3<f64>) -> Option<Matrix3<f64>> {
+    /// Levenberg-Marquardt on SO(3); `None` where it does not arrive, or comes to one of the minima that are known.
+    fn descend(&self, mut rotation: Matrix3<f64>, known: &[Matrix3<f64>]) -> Option<Matrix3<f64>> {
         let vector = |r: &Matrix3<f64>| Vector9::from_column_slice(r.as_slice());
         let look = |r: &Matrix3<f64>| {
             let (at, turned) = (vector(r), self.omega * vector(r));
@@ -144,6 +147,9 @@ impl ObjectSpace {
             let (next_gradient, next_cost) = look(&next);
             if next_cost < cost {
                 (rotation, gradient9, cost, lambda) = (next, next_gradient, next_cost, lambda * 0.1);
+                if known.iter().any(|minimum| (minimum - rotation).norm_squared() < NEAR * NEAR) {
+                    return None;
+                }
             } else {
                 lambda *= 10.0;
             }
