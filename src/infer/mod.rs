@@ -1,6 +1,7 @@
 //! What a known rig is for: pixels to poses and joints, with covariance, and poses to joints.
 mod box_step;
 mod branch;
+mod closest;
 mod history;
 mod information;
 mod inverse;

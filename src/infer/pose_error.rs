@@ -28,6 +28,9 @@ pub(super) struct PoseError {
     program: BoxStep,
 }
 
+/// Step of the differences of the gradient [rad or m].
+const STEP: f64 = 1e-5;
+
 impl PoseError {
     /// The cost with these joints [rad²].
     #[inline]
@@ -66,18 +69,64 @@ impl PoseError {
         damping: f64,
         pull: Option<(&[f64], f64)>,
     ) -> Option<&[f64]> {
+        self.linearize(joints.len());
+        let mut diagonal = damping;
+        if let Some((near, weight)) = pull {
+            // The pull's own curvature is as good as damping: the step is where both together are least.
+            diagonal += weight;
+            for (i, slope) in self.gradient.iter_mut().enumerate() {
+                *slope += weight * (near[i] - joints[i]);
+            }
+        }
+        self.solve(limits, joints, diagonal)
+    }
+
+    /// The damped Newton step from joints, inside the limits, with the whole Hessian by differences of the gradient: far from a pose
+    /// that is out of reach, Gauss-Newton steps are far too long. `None` where the damping does not make it positive definite.
+    pub fn newton_step(
+        &mut self,
+        chain: &JointChain,
+        target: &Pose,
+        limits: &JointBox,
+        joints: &[f64],
+        (length, damping): (f64, f64),
+    ) -> Option<&[f64]> {
         let n = joints.len();
+        let mut moved = joints.to_vec();
+        let mut rows = Vec::with_capacity(n * n);
+        for i in 0..n {
+            for step in [STEP, -STEP] {
+                moved[i] = joints[i] + step;
+                self.look(chain, target, &moved, length);
+                self.linearize(n);
+                if step > 0.0 {
+                    rows.extend_from_slice(&self.gradient);
+                } else {
+                    let row = rows[i * n..].iter_mut().zip(&self.gradient);
+                    row.for_each(|(high, low)| *high = (low - *high) / (2.0 * STEP));
+                }
+            }
+            moved[i] = joints[i];
+        }
+        self.look(chain, target, joints, length);
+        self.linearize(n);
+        for i in 0..n {
+            for j in 0..=i {
+                self.hessian[i * n + j] = 0.5 * (rows[i * n + j] + rows[j * n + i]);
+            }
+        }
+        self.solve(limits, joints, damping)
+    }
+
+    /// Gradient, downhill, and Gauss-Newton matrix.
+    #[inline]
+    fn linearize(&mut self, n: usize) {
         self.columns.resize(n, [0.0; 6]);
         self.hessian.resize(n * n, 0.0);
         self.gradient.resize(n, 0.0);
-        self.lower.clear();
-        self.upper.clear();
         self.posture.jacobian(&mut self.columns);
-        for (i, column) in self.columns.iter_mut().enumerate() {
+        for column in &mut self.columns {
             column[3..].iter_mut().for_each(|x| *x *= self.weight);
-            let (down, up) = limits.room(i, joints[i]);
-            self.lower.push(down);
-            self.upper.push(up);
         }
         let shift = self.shift * self.weight;
         let error = [self.turn.x, self.turn.y, self.turn.z, shift.x, shift.y, shift.z];
@@ -87,15 +136,18 @@ impl PoseError {
                 self.hessian[i * n + j] = dot(column, other);
             }
         }
-        let mut diagonal = damping;
-        if let Some((near, weight)) = pull {
-            // The pull's own curvature is as good as damping: the step is where both together are least.
-            diagonal += weight;
-            for (i, slope) in self.gradient.iter_mut().enumerate() {
-                *slope += weight * (near[i] - joints[i]);
-            }
+    }
+
+    #[inline]
+    fn solve(&mut self, limits: &JointBox, joints: &[f64], damping: f64) -> Option<&[f64]> {
+        self.lower.clear();
+        self.upper.clear();
+        for (i, &joint) in joints.iter().enumerate() {
+            let (down, up) = limits.room(i, joint);
+            self.lower.push(down);
+            self.upper.push(up);
         }
-        let solved = self.program.solve(&self.hessian, &self.gradient, diagonal, &self.lower, &self.upper);
+        let solved = self.program.solve(&self.hessian, &self.gradient, damping, &self.lower, &self.upper);
         solved.then_some(&self.program.step)
     }
 }

@@ -2,6 +2,7 @@
 mod calibration;
 mod cli;
 mod cli_calibrate;
+mod cli_infer;
 mod determinism;
 mod deviations;
 mod doctor;
