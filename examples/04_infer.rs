@@ -4,6 +4,7 @@
 use handeye::infer::{InferOptions, Inference, InverseKinematics, InverseOptions, Moment, Names, Prior};
 use handeye::rig::{Model, catalog};
 use handeye::simulate::{SimulateOptions, simulate};
+use std::f64::consts::TAU;
 
 fn main() -> Result<(), handeye::Error> {
     let mut rig = catalog::rig("ur5")?;
@@ -13,7 +14,7 @@ fn main() -> Result<(), handeye::Error> {
 
     // An arm that may turn all the way round has several branches that explain the same pixels.
     for joint in &mut rig.robot.joints {
-        (joint.limits.lower, joint.limits.upper) = (Some(-6.28), Some(6.28));
+        (joint.limits.lower, joint.limits.upper) = (Some(-TAU), Some(TAU));
     }
     let names = Names::new(&rig, &simulation.recording);
     let mut inference = Inference::new(&rig, InferOptions::default())?;
