@@ -39,6 +39,10 @@ pub(super) struct Minimum {
     pub cost: f64,
 }
 
+/// Minima whose joints all differ by less are one [rad or m]: refining ends far nearer to the minimum, but for directions that are
+/// nearly open.
+pub(super) const APART: f64 = 1e-2;
+
 /// Branches less probable than this are left out.
 const HOPELESS: f64 = 1e-9;
 
@@ -67,11 +71,6 @@ impl Minimum {
         let (least, most) = (self.cost.min(other.cost), self.cost.max(other.cost));
         self.misfit = self.misfit.min(other.misfit);
         self.cost = least - (least - most).exp().ln_1p();
-    }
-
-    /// Minima that differ by less are one [rad or m].
-    pub fn apart(&self) -> f64 {
-        1e-2
     }
 }
 

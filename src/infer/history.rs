@@ -1,6 +1,6 @@
 //! Branches told apart by the actions taken: what was inferred before, moved by an action, against what is seen after.
 use super::Sighting;
-use super::branch::{Branch, Minimum, branches};
+use super::branch::{APART, Branch, Minimum, branches};
 use super::information::Information;
 use super::joints::Inference;
 use super::pose::is_plausible;
@@ -63,7 +63,7 @@ impl Inference {
         for branch in before {
             let Some((information, weight)) = self.moved_belief(branch, action) else { continue };
             let Some(minimum) = self.refine_belief(&seen, &information, &limits, weight) else { continue };
-            match minima.iter_mut().find(|other| self.limits.distance(&other.joints, &minimum.joints) < other.apart()) {
+            match minima.iter_mut().find(|other| self.limits.distance(&other.joints, &minimum.joints) < APART) {
                 Some(other) => other.merge(&minimum),
                 None => minima.push(minimum),
             }

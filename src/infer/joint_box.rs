@@ -25,8 +25,10 @@ const SLIDE: f64 = 1.0;
 impl JointBox {
     pub fn new(rig: &Rig) -> Self {
         let joints = &rig.robot.joints;
-        let lower: Vec<f64> = joints.iter().map(|joint| joint.limits.lower.unwrap_or(f64::NEG_INFINITY)).collect();
-        let upper: Vec<f64> = joints.iter().map(|joint| joint.limits.upper.unwrap_or(f64::INFINITY)).collect();
+        let known = |limit: Option<f64>| limit.filter(|limit| !limit.is_nan());
+        let lower: Vec<f64> =
+            joints.iter().map(|joint| known(joint.limits.lower).unwrap_or(f64::NEG_INFINITY)).collect();
+        let upper: Vec<f64> = joints.iter().map(|joint| known(joint.limits.upper).unwrap_or(f64::INFINITY)).collect();
         let comes_round = |(i, joint): (usize, &crate::rig::Joint)| {
             // Limits that were rounded to ten digits still make a whole turn.
             joint.kind == JointKind::Revolute && upper[i] - lower[i] >= TAU - 1e-9

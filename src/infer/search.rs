@@ -1,6 +1,6 @@
 //! From a start to the minimum that it leads to, in pixels.
 use super::Sighting;
-use super::branch::Minimum;
+use super::branch::{APART, Minimum};
 use super::information::Information;
 use super::joints::Inference;
 use super::pose::is_plausible;
@@ -47,7 +47,7 @@ impl Inference {
         start: Vec<f64>,
     ) {
         let Some(minimum) = self.refine(seen, information, prior, start, true) else { return };
-        if minima.iter().all(|other| self.limits.distance(&other.joints, &minimum.joints) > other.apart()) {
+        if minima.iter().all(|other| self.limits.distance(&other.joints, &minimum.joints) > APART) {
             minima.push(minimum);
         }
     }

@@ -9,6 +9,7 @@ mod doctor;
 mod experiments;
 mod folds;
 mod infer;
+mod infer_arms;
 mod infer_rigs;
 mod influence;
 mod learning;
