@@ -8,6 +8,7 @@ mod error;
 pub mod experiments;
 pub mod factors;
 pub mod geometry;
+pub mod infer;
 pub mod online;
 pub mod recording;
 pub mod rig;

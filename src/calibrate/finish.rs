@@ -61,6 +61,7 @@ pub(crate) fn finish(
         rms_px: total.rms_px,
         mean_px: total.mean_px,
         gauge: gauge.clone(),
+        joints: ranges(setup, state, &used_samples),
         sd: deviations.by_path,
     });
     let unseen = setup.unseen.iter().map(|camera| Finding::UnseenCamera { camera: camera.clone() });
@@ -86,6 +87,18 @@ pub(crate) fn finish(
         targets: None,
     };
     Calibration { rig, report }
+}
+
+/// Smallest and largest value of every joint in samples with joints that were used.
+fn ranges(setup: &Setup, state: &State, used: &[bool]) -> Vec<[f64; 2]> {
+    let is_used = |sample: &usize| setup.states.chain && state.placed[*sample] && used[*sample];
+    let widened = |ranges: Option<Vec<[f64; 2]>>, sample: usize| {
+        let joints = &state.joints[sample];
+        let widen = |([lower, upper], joint): ([f64; 2], &f64)| [lower.min(*joint), upper.max(*joint)];
+        let all = ranges.unwrap_or_else(|| joints.iter().map(|joint| [*joint; 2]).collect());
+        Some(all.into_iter().zip(joints).map(widen).collect())
+    };
+    (0..setup.len()).filter(is_used).fold(None, widened).unwrap_or_default()
 }
 
 /// The rig with every value filled in.

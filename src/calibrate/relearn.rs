@@ -43,7 +43,17 @@ pub fn relearn(
     let mut learned = calibrate(&part, recording, options, observer)?;
     learned.rig.estimate.clone_from(&rig.estimate);
     restore(&mut learned.rig, rig, &free);
+    if let (Some(now), Some(before)) = (&mut learned.rig.fit, &rig.fit) {
+        widen(&mut now.joints, &before.joints);
+    }
     Ok(learned)
+}
+
+/// Few samples have not been everywhere that the rig was learned.
+fn widen(ranges: &mut [[f64; 2]], before: &[[f64; 2]]) {
+    for (range, before) in ranges.iter_mut().zip(before) {
+        *range = [range[0].min(before[0]), range[1].max(before[1])];
+    }
 }
 
 /// Held values as they were written, which the way through rotations may have changed in the last bit.

@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 
 mod brown_conrady;
 mod kannala_brandt;
+mod linearize;
 mod perspective;
 mod pinhole;
 mod rational;

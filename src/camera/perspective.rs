@@ -19,13 +19,18 @@ const CENTRE: f64 = 1e-200;
 ///     sign and hold it there.
 #[inline]
 pub(super) fn divide<T: Scalar>(p: &Vector3<T>) -> [T; 2] {
-    let (x, y, z) = (p.x.value(), p.y.value(), p.z.value());
-    if z > 0.0 && z * z >= EDGE * EDGE * (x * x + y * y + z * z) {
+    if keeps_depth(&Vector3::new(p.x.value(), p.y.value(), p.z.value())) {
         let inverse = T::one() / p.z;
         [p.x * inverse, p.y * inverse]
     } else {
         divide_behind(p)
     }
+}
+
+/// True where the depth is not replaced.
+#[inline]
+pub(super) fn keeps_depth(p: &Vector3<f64>) -> bool {
+    p.z > 0.0 && p.z * p.z >= EDGE * EDGE * p.norm_squared()
 }
 
 #[cold]

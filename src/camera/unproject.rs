@@ -24,6 +24,10 @@ impl CameraModel {
     pub fn unproject(self, parameters: &[f64; PARAMETERS], pixel: [f64; 2]) -> Option<Vector3<f64>> {
         let [fx, fy, cx, cy, distortion @ ..] = parameters;
         let target = [(pixel[0] - cx) / fx, (pixel[1] - cy) / fy];
+        if self == CameraModel::Pinhole {
+            let ray = Vector3::new(target[0], target[1], 1.0);
+            return target.iter().all(|number| number.is_finite()).then(|| ray / ray.norm());
+        }
         let direct = self.newton(distortion, target, target).filter(|&chart| self.is_unfolded(distortion, chart));
         let chart = direct.or_else(|| self.follow(distortion, target))?;
         let ray = self.ray(chart);

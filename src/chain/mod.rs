@@ -3,9 +3,11 @@ use handeye_solvers::{Pose, Scalar};
 
 mod dh;
 mod jacobian;
+mod joint_chain;
 mod modified_dh;
 
 pub use jacobian::ChainJacobian;
+pub use joint_chain::{Axis, JointChain, Posture};
 
 /// Numbers of a link: offset [rad], d [m], a [m], alpha [rad], beta [rad].
 pub const LINK_PARAMETERS: usize = 5;

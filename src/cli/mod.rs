@@ -8,6 +8,7 @@ mod demo;
 mod evaluate;
 mod experiment;
 mod folds;
+mod infer;
 mod inputs;
 mod monitor;
 mod noise;
@@ -31,6 +32,7 @@ Examples:
   handeye calibrate motions.jsonl -o learned.toml                  from the recording alone
   handeye calibrate motions.jsonl --rig arm.toml -o learned.toml   from what is known of the rig
   handeye evaluate learned.toml fresh.jsonl                        judge it on other samples
+  handeye infer learned.toml fresh.jsonl                           joints and poses from pixels alone
 
 Exit status: 0 done; 1 the work could not be done, with the reason; 2 unusable input or arguments.";
 
@@ -55,6 +57,7 @@ enum Command {
     Simulate(simulate::Simulate),
     Calibrate(calibrate::Calibrate),
     Evaluate(evaluate::Evaluate),
+    Infer(infer::Infer),
     Monitor(monitor::MonitorCommand),
     Experiment(experiment::ExperimentCommand),
     Completions(completions::Completions),
@@ -76,6 +79,7 @@ impl Cli {
             Command::Simulate(simulate) => simulate.run(),
             Command::Calibrate(calibrate) => calibrate.run(self.json),
             Command::Evaluate(evaluate) => evaluate.run(),
+            Command::Infer(infer) => infer.run(),
             Command::Monitor(monitor) => monitor.run(),
             Command::Experiment(experiment) => experiment.run(),
             Command::Completions(completions) => completions.run(),

@@ -8,6 +8,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     about: "error on held-out samples against error on training samples",
     source: "Gothoskar et al., figure 3",
     trials: 50,
+    is_timed: false,
     run,
 };
 

@@ -14,6 +14,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     about: "samples needed to learn a third camera, or one of two that was moved",
     source: "Gothoskar et al., figure 4",
     trials: 60,
+    is_timed: false,
     run,
 };
 

@@ -12,6 +12,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     about: "samples needed to learn where new features are",
     source: "Gothoskar et al., figure 5",
     trials: 60,
+    is_timed: false,
     run,
 };
 

@@ -14,6 +14,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     about: "samples needed to learn where the base was moved to",
     source: "Gothoskar et al., figure 6",
     trials: 60,
+    is_timed: false,
     run,
 };
 

@@ -9,6 +9,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     about: "samples needed to learn the kinematics, and to learn everything",
     source: "Gothoskar et al., figure 7",
     trials: 60,
+    is_timed: false,
     run,
 };
 

@@ -8,6 +8,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     about: "pixel error before and after all parameters are learned together",
     source: "Gothoskar et al., table 1",
     trials: 50,
+    is_timed: false,
     run,
 };
 

@@ -17,6 +17,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     about: "pixel error after learning all at once, and in stages",
     source: "Gothoskar et al., table 2",
     trials: 20,
+    is_timed: false,
     run,
 };
 

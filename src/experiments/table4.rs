@@ -8,6 +8,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     about: "k-fold cross-validation on 200 samples",
     source: "Gothoskar et al., table 4",
     trials: 10,
+    is_timed: false,
     run,
 };
 

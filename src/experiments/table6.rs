@@ -15,6 +15,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     about: "joints inferred from one camera and from both",
     source: "Gothoskar et al., table 6",
     trials: 20,
+    is_timed: false,
     run,
 };
 

@@ -12,6 +12,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     about: "norm of the gradient as samples of a shifted camera fill the buffer",
     source: "Gothoskar et al., table 7",
     trials: 50,
+    is_timed: false,
     run,
 };
 

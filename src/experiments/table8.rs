@@ -14,6 +14,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     about: "error after learning from noisy joint readings, with and without the noise modelled",
     source: "Gothoskar et al., table 8",
     trials: 20,
+    is_timed: false,
     run,
 };
 

@@ -1,29 +1,14 @@
 //! The pose of a camera from known points and the directions that they are seen in.
 //!
-//! As in SQPnP (Terzakis and Lourakis 2020) the translation is eliminated from the error in object space, which leaves
-//! a quadratic form rᵀ Ω r in the nine elements of the rotation. Its minima on SO(3) are found from starts that cover
-//! all rotations, at a cost that does not depend on the number of points, and then refined on the angles.
+//! The minima of the error in object space are found from starts that cover all rotations, at a cost that does not depend on the
+//! number of points, and then refined on the angles.
+use super::object_space::{ObjectSpace, SAME};
 use super::reprojection::refine;
-use super::rotation::nearest_rotation;
 use handeye_solvers::Pose;
-use handeye_solvers::manifold::so3;
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
-
-type Matrix9 = SMatrix<f64, 9, 9>;
-type Matrix3x9 = SMatrix<f64, 3, 9>;
-type Vector9 = SVector<f64, 9>;
-
-/// Iterations from one start; minima are isolated, and refined again afterwards.
-const ITERATIONS: usize = 20;
-
-/// Eigenvectors of Ω that serve as starts.
-const EIGENVECTORS: usize = 4;
+use nalgebra::Vector3;
 
 /// Most solutions: three points have up to four.
 const SOLUTIONS: usize = 4;
-
-/// Two rotations closer than this (Frobenius norm) are one solution.
-const SAME: f64 = 1e-3;
 
 /// The poses `camera_from_points` that may have been, least error first: at most 4.
 ///
@@ -47,7 +32,7 @@ pub(super) fn resect_with_errors(points: &[Vector3<f64>], bearings: &[Vector3<f6
         return Vec::new();
     }
     let scaled: Vec<_> = points.iter().map(|p| (p - mean) / size).collect();
-    let Some(form) = Form::new(&scaled, bearings) else { return Vec::new() };
+    let Some(form) = ObjectSpace::new(&scaled, &[], bearings) else { return Vec::new() };
     let all: Vec<usize> = (0..points.len()).collect();
     let mut solutions: Vec<(Pose, f64)> = Vec::new();
     for rotation in form.minima() {
@@ -71,101 +56,6 @@ pub(super) fn resect_with_errors(points: &[Vector3<f64>], bearings: &[Vector3<f6
 
 fn in_front(camera: &Pose, points: &[Vector3<f64>], bearings: &[Vector3<f64>]) -> bool {
     points.iter().zip(bearings).all(|(p, b)| camera.transform(p).dot(b) > 0.0)
-}
-
-/// rᵀ Ω r, the error in object space with the best translation, t = T r; r is the rotation by columns.
-struct Form {
-    omega: Matrix9,
-    translation: Matrix3x9,
-}
-
-impl Form {
-    /// `None` where the bearings are all one, or not finite.
-    fn new(points: &[Vector3<f64>], bearings: &[Vector3<f64>]) -> Option<Self> {
-        let (mut omega, mut linear, mut total) = (Matrix9::zeros(), Matrix3x9::zeros(), Matrix3::zeros());
-        for (p, b) in points.iter().zip(bearings) {
-            // Q (R p + t) with Q = I - b bᵀ, and R p = A r.
-            let q = Matrix3::identity() - b * b.transpose();
-            for i in 0..3 {
-                let scaled = q * p[i];
-                let mut columns = linear.fixed_view_mut::<3, 3>(0, 3 * i);
-                columns += scaled;
-                for j in 0..3 {
-                    let mut block = omega.fixed_view_mut::<3, 3>(3 * i, 3 * j);
-                    block += scaled * p[j];
-                }
-            }
-            total += q;
-        }
-        let translation = -(total.cholesky()?.inverse() * linear);
-        omega += linear.transpose() * translation;
-        omega.iter().all(|v| v.is_finite()).then_some(Form { omega, translation })
-    }
-
-    fn translation(&self, rotation: &Matrix3<f64>) -> Vector3<f64> {
-        self.translation * Vector9::from_column_slice(rotation.as_slice())
-    }
-
-    /// Local minima over all rotations, each once.
-    fn minima(&self) -> Vec<Matrix3<f64>> {
-        let mut found: Vec<Matrix3<f64>> = Vec::new();
-        for start in self.starts() {
-            let Some(minimum) = self.descend(start) else { continue };
-            if found.iter().all(|other| (other - minimum).norm() > SAME) {
-                found.push(minimum);
-            }
-        }
-        found
-    }
-
-    /// The rotations nearest to the flattest directions of Ω, then the 24 of a cube: none is farther than 63° from one.
-    fn starts(&self) -> Vec<Matrix3<f64>> {
-        let mut starts = Vec::new();
-        if let Some(eigen) = self.omega.try_symmetric_eigen(f64::EPSILON, 200) {
-            let mut order: Vec<usize> = (0..9).collect();
-            order.sort_by(|&i, &j| eigen.eigenvalues[i].total_cmp(&eigen.eigenvalues[j]));
-            for &k in &order[..EIGENVECTORS] {
-                let matrix = Matrix3::from_column_slice(eigen.eigenvectors.column(k).as_slice());
-                starts.extend([matrix, -matrix].iter().filter_map(nearest_rotation));
-            }
-        }
-        for [i, j] in [[0, 1], [1, 2], [2, 0], [0, 2], [2, 1], [1, 0]] {
-            for (s, t) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
-                let (x, y) = (Vector3::ith(i, s), Vector3::ith(j, t));
-                starts.push(Matrix3::from_columns(&[x, y, x.cross(&y)]));
-            }
-        }
-        starts
-    }
-
-    /// Levenberg-Marquardt on SO(3); `None` where it does not arrive.
-    fn descend(&self, mut rotation: Matrix3<f64>) -> Option<Matrix3<f64>> {
-        let vector = |r: &Matrix3<f64>| Vector9::from_column_slice(r.as_slice());
-        let mut gradient9 = self.omega * vector(&rotation);
-        let mut cost = vector(&rotation).dot(&gradient9);
-        let mut lambda = 1e-4;
-        for _ in 0..ITERATIONS {
-            // d vec(exp(w) R) = J dw, with eₖ × (columns of R) as the columns of J.
-            let tangent = |k: usize| vector(&(so3::cross_matrix(&Vector3::ith(k, 1.0)) * rotation));
-            let jacobian = SMatrix::<f64, 9, 3>::from_columns(&[tangent(0), tangent(1), tangent(2)]);
-            let mut hessian = jacobian.transpose() * (self.omega * jacobian);
-            let damping = lambda * hessian.trace();
-            (0..3).for_each(|k| hessian[(k, k)] += damping);
-            let step = -hessian.cholesky()?.solve(&(jacobian.transpose() * gradient9));
-            let next = so3::renormalize(&(so3::exp(&step) * rotation));
-            let next_gradient = self.omega * vector(&next);
-            let next_cost = vector(&next).dot(&next_gradient);
-            if next_cost < cost {
-                (rotation, gradient9, cost, lambda) = (next, next_gradient, next_cost, lambda * 0.1);
-            } else {
-                lambda *= 10.0;
-            }
-            if step.norm_squared() < 1e-14 {
-                return Some(rotation);
-            }
-        }
-        Some(rotation)
-    }
 }
 
 #[cfg(test)]

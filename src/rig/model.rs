@@ -2,7 +2,7 @@
 use super::{Parent, Rig};
 use crate::Error;
 use crate::camera::{CameraModel, PARAMETERS};
-use crate::chain::{Chain, LINK_PARAMETERS};
+use crate::chain::{Chain, JointChain, LINK_PARAMETERS};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
 
@@ -96,6 +96,11 @@ impl Model {
     /// Poses in the world of every link, the base first: as many as joints and one more.
     pub fn links(&self, joints: &[f64]) -> Vec<Pose> {
         std::iter::once(self.base).chain(self.chain.links(&self.base, &self.parameters, joints)).collect()
+    }
+
+    /// The chain with the model's parameters, of which only the joints move: for loops.
+    pub fn joint_chain(&self) -> JointChain {
+        JointChain::new(&self.chain, &self.base, &self.parameters)
     }
 
     /// `world_from_tip`.

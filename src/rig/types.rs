@@ -201,6 +201,8 @@ pub struct Fit {
     pub mean_px: f64,
     /// What the data cannot determine, in words, and how it was fixed.
     pub gauge: Vec<String>,
+    /// Smallest and largest value of every joint in the samples used [rad or m], in the order of the rig's joints; empty without any.
+    pub joints: Vec<[f64; 2]>,
     /// Standard deviation of every learned scalar by parameter path; poses and points have 6 and 3 numbers.
     pub sd: BTreeMap<String, Vec<f64>>,
 }

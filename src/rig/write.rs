@@ -149,6 +149,9 @@ fn write_fit(table: &mut dyn TableLike, fit: &Fit) {
     set(table, "rms_px", number(fit.rms_px));
     set(table, "mean_px", number(fit.mean_px));
     set_texts(table, "gauge", &fit.gauge);
+    if !fit.joints.is_empty() {
+        set(table, "joints", Value::Array(fit.joints.iter().map(|range| numbers(range)).collect()));
+    }
     if fit.sd.is_empty() {
         return;
     }

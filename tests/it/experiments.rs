@@ -8,6 +8,7 @@ use serde_json::Value;
 const PUBLISHED: &[(&str, &[&str])] = &[
     ("table1", &["414.21", "0.47"]),
     ("table2", &["549.4", "27077.9", "0.47"]),
+    ("table3", &["1.27 (0.01)", "0.041 (0.003)", "16.1 (0.81)", "0.511 (0.185)", "101 (1.1)", "102 (1.1)"]),
     ("table4", &["0.56 (0.0205)", "0.5502 (0.0417)", "0.5577 (0.0663)", "0.6368 (0.2268)", "0.5445 (0.0667)"]),
     ("table5", &["49.3582 (43.5229)", "3.2066 (2.3041)", "0.6235 (0.0143)", "0.6168 (0.0082)", "0.5991 (0.0082)"]),
     ("figure3", &["sub-pixel"]),
@@ -55,7 +56,7 @@ fn every_experiment_is_listed_runs_and_prints_what_was_published() {
 
 #[test]
 fn the_same_seed_gives_the_same_figures_on_any_number_of_threads_and_another_seed_others() {
-    for experiment in ALL {
+    for experiment in ALL.iter().filter(|experiment| !experiment.is_timed) {
         let run = |threads: usize, seed: u64| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| experiment.run(&Options { trials: 2, seed }).unwrap())
@@ -87,8 +88,8 @@ fn figures_are_drawn_and_tables_without_an_abscissa_are_refused() {
 #[test]
 fn what_is_no_experiment_is_refused_with_those_that_are() {
     let folder = Folder::new("experiment-names");
-    let (_, complaint) = folder.expect(2, "experiment table3");
-    assert!(complaint.contains("no experiment is called `table3`"), "{complaint}");
+    let (_, complaint) = folder.expect(2, "experiment table9");
+    assert!(complaint.contains("no experiment is called `table9`"), "{complaint}");
     let (_, complaint) = folder.expect(2, "experiment table5 --trials 0");
     assert!(complaint.contains("at least 1"), "{complaint}");
 }

@@ -2,11 +2,15 @@
 mod calibration;
 mod cli;
 mod cli_calibrate;
+mod cli_infer;
 mod determinism;
 mod deviations;
 mod doctor;
 mod experiments;
 mod folds;
+mod infer;
+mod infer_arms;
+mod infer_rigs;
 mod influence;
 mod learning;
 mod malformed_input;

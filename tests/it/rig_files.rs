@@ -110,6 +110,7 @@ fn random_rig(seed: u64) -> Rig {
             rig.estimate.prior.insert(path, random.random_range(1e-9..10.0));
         }
     }
+    let joints = rig.robot.joints.clone();
     rig.fit = maybe(random, |r| Fit {
         samples: r.random_range(0..1000),
         observations: r.random_range(0..100_000),
@@ -117,6 +118,7 @@ fn random_rig(seed: u64) -> Rig {
         rms_px: r.random_range(0.0..1.0),
         mean_px: r.random_range(0.0..1.0),
         gauge: (0..r.random_range(0..3)).map(|i| format!("the world's frame, {i}")).collect(),
+        joints: joints.iter().map(|_| [r.random_range(-3.0..0.0), r.random_range(0.0..3.0)]).collect(),
         sd: [("robot.base".to_owned(), (0..6).map(|_| r.random_range(0.0..1.0)).collect())].into(),
     });
     rig

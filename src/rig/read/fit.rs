@@ -5,7 +5,7 @@ use crate::Error;
 use crate::rig::{Fit, Rig};
 
 pub(super) fn read_fit(node: &Node, rig: &Rig) -> Result<Fit, Error> {
-    let known = ["samples", "observations", "rejected", "rms_px", "mean_px", "gauge", "sd"];
+    let known = ["samples", "observations", "rejected", "rms_px", "mean_px", "gauge", "joints", "sd"];
     let fields = node.clone().table(&known)?.labelled("fit");
     let count = |node: &Node| node.whole::<u32>().map(|n| n as usize);
     let sd = fields.optional("sd", |node| {
@@ -21,6 +21,7 @@ pub(super) fn read_fit(node: &Node, rig: &Rig) -> Result<Fit, Error> {
         rms_px: fields.optional("rms_px", Node::not_negative)?.unwrap_or_default(),
         mean_px: fields.optional("mean_px", Node::not_negative)?.unwrap_or_default(),
         gauge: fields.optional("gauge", read_gauge)?.unwrap_or_default(),
+        joints: fields.optional("joints", |node| read_ranges(node, rig))?.unwrap_or_default(),
         sd: sd.unwrap_or_default(),
     })
 }
@@ -31,6 +32,19 @@ fn read_gauge(node: &Node) -> Result<Vec<String>, Error> {
         node.list()?.iter().map(|entry| entry.text().map(str::to_owned)).collect()
     } else {
         Ok(vec![node.text()?.to_owned()])
+    }
+}
+
+/// [smallest, largest] of every joint.
+fn read_ranges(node: &Node, rig: &Rig) -> Result<Vec<[f64; 2]>, Error> {
+    let ranges = node.list()?.iter().map(Node::numbers::<2>).collect::<Result<Vec<_>, _>>()?;
+    if ranges.len() != rig.robot.joints.len() {
+        let (found, joints) = (ranges.len(), rig.robot.joints.len());
+        return Err(node.error(format!("expected a range for each of {joints} joints, found {found}")));
+    }
+    match ranges.iter().find(|[lower, upper]| lower > upper) {
+        Some([lower, upper]) => Err(node.error(format!("a range begins at {lower} and ends below it, at {upper}"))),
+        None => Ok(ranges),
     }
 }
 

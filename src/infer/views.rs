@@ -1,0 +1,89 @@
+//! A detection as a linear function of where its feature is.
+use super::Sighting;
+use crate::camera::{CameraModel, PARAMETERS};
+use crate::rig::{Model, Parent};
+use handeye_solvers::Pose;
+use handeye_solvers::manifold::so3;
+use nalgebra::Vector3;
+
+/// Cameras and features of a model, each with the number of joints that move it.
+#[derive(Clone, Debug)]
+pub(super) struct Views {
+    pub cameras: Vec<View>,
+    pub features: Vec<Spot>,
+}
+
+/// A camera.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct View {
+    pub model: CameraModel,
+    pub intrinsics: [f64; PARAMETERS],
+    /// `parent_from_camera`.
+    pub pose: Pose,
+    /// Joints that move it, from the base: 0 in the world.
+    pub depth: usize,
+}
+
+/// A feature.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spot {
+    pub xyz: Vector3<f64>,
+    pub depth: usize,
+}
+
+/// Prediction of a detection, and how it follows the feature.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Glance {
+    /// Predicted minus seen [px].
+    pub error: [f64; 2],
+    /// The pixel's rows by the feature's position in the world [px/m].
+    pub rows: [Vector3<f64>; 2],
+    /// The feature in the world [m].
+    pub point: Vector3<f64>,
+}
+
+impl Views {
+    pub fn new(model: &Model) -> Self {
+        let depth = |parent: Parent| match parent {
+            Parent::World => 0,
+            Parent::Link(joint) => joint + 1,
+            Parent::Tip => model.chain.len(),
+        };
+        let view = |camera: &crate::rig::ModelCamera| View {
+            model: camera.model,
+            intrinsics: camera.intrinsics,
+            pose: camera.pose,
+            depth: depth(camera.parent),
+        };
+        let spot = |feature: &crate::rig::ModelFeature| Spot { xyz: feature.xyz, depth: depth(feature.parent) };
+        Views { cameras: model.cameras.iter().map(view).collect(), features: model.features.iter().map(spot).collect() }
+    }
+
+    /// True where both are of the rig and the pixel is finite.
+    pub fn knows(&self, sighting: &Sighting) -> bool {
+        sighting.camera < self.cameras.len()
+            && sighting.feature < self.features.len()
+            && sighting.pixel.iter().all(|number| number.is_finite())
+    }
+
+    /// Joints between a camera and a feature, which are those that move its pixel: from the first to before the second.
+    pub fn between(&self, sighting: &Sighting) -> (usize, usize) {
+        let (camera, feature) = (self.cameras[sighting.camera].depth, self.features[sighting.feature].depth);
+        (camera.min(feature), camera.max(feature))
+    }
+
+    /// `feature_frame`, `world_from_camera`: where the feature's parent and the camera are in the world.
+    #[inline]
+    pub fn glance(&self, sighting: &Sighting, feature_frame: Option<&Pose>, world_from_camera: &Pose) -> Glance {
+        let xyz = &self.features[sighting.feature].xyz;
+        let point = feature_frame.map_or(*xyz, |frame| frame.transform(xyz));
+        let camera = &self.cameras[sighting.camera];
+        let in_camera = so3::apply_transposed(&world_from_camera.rotation, &(point - world_from_camera.translation));
+        let (pixel, slopes) = camera.model.linearize(&camera.intrinsics, &in_camera);
+        Glance {
+            error: [pixel[0] - sighting.pixel[0], pixel[1] - sighting.pixel[1]],
+            rows: slopes.map(|slope| so3::apply(&world_from_camera.rotation, &slope)),
+            point,
+        }
+    }
+}
