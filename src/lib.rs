@@ -12,6 +12,7 @@ pub mod infer;
 pub mod online;
 pub mod recording;
 pub mod rig;
+pub mod servo;
 pub mod simulate;
 
 pub use error::Error;

@@ -179,10 +179,7 @@ impl QuadraticProgram {
                     && solver.update_b(&work.b).is_ok();
                 updated.then_some(solver)
             }
-            none => match set_up(work, n, m) {
-                Some(solver) => Some(none.insert(solver)),
-                None => None,
-            },
+            none => set_up(work, n, m).map(|solver| none.insert(solver)),
         };
         let Some(solver) = solver else {
             self.nearest_to_zero(qp);
@@ -245,9 +242,9 @@ impl Work {
         self.b.extend((0..m).map(|i| near(qp.bounds[i] / self.norms[i])));
         self.b.extend(std::iter::repeat_n(0.0, m));
         self.a.clear();
-        for j in 0..n {
+        for (j, d) in d.iter().enumerate() {
             self.a.extend([1.0, -1.0]);
-            self.a.extend((0..m).map(|i| qp.rows[i * n + j] * d[j] / self.norms[i]));
+            self.a.extend((0..m).map(|i| qp.rows[i * n + j] * d / self.norms[i]));
         }
         self.a.extend(std::iter::repeat_n(-1.0, 2 * m));
         kappa

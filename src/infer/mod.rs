@@ -16,6 +16,8 @@ mod sighting;
 mod starts;
 mod views;
 
+pub(crate) use views::Views;
+
 pub use branch::Branch;
 pub use history::Moment;
 pub use inverse::{InverseKinematics, InverseOptions, Reached};

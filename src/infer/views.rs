@@ -8,14 +8,14 @@ use nalgebra::Vector3;
 
 /// Cameras and features of a model, each with the number of joints that move it.
 #[derive(Clone, Debug)]
-pub(super) struct Views {
+pub(crate) struct Views {
     pub cameras: Vec<View>,
     pub features: Vec<Spot>,
 }
 
 /// A camera.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct View {
+pub(crate) struct View {
     pub model: CameraModel,
     pub intrinsics: [f64; PARAMETERS],
     /// `parent_from_camera`.
@@ -26,14 +26,14 @@ pub(super) struct View {
 
 /// A feature.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Spot {
+pub(crate) struct Spot {
     pub xyz: Vector3<f64>,
     pub depth: usize,
 }
 
 /// Prediction of a detection, and how it follows the feature.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Glance {
+pub(crate) struct Glance {
     /// Predicted minus seen [px].
     pub error: [f64; 2],
     /// The pixel's rows by the feature's position in the world [px/m].

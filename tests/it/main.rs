@@ -20,6 +20,7 @@ mod readme;
 mod recording_files;
 mod relearn;
 mod rig_files;
+mod servo;
 mod simulate;
 mod states;
 mod targets;

@@ -1,0 +1,115 @@
+//! A complete rig prepared for control loops, and where it is at a moment.
+use crate::Error;
+use crate::chain::{JointChain, Posture};
+use crate::infer::{Sighting, Views};
+use crate::rig::{Limits, Model, Rig};
+use handeye_solvers::Pose;
+use nalgebra::Vector3;
+
+/// Arm, cameras and features with fixed parameters.
+#[derive(Clone, Debug)]
+pub struct Arm {
+    chain: JointChain,
+    views: Views,
+    limits: Vec<Limits>,
+    sizes: Vec<Option<[u32; 2]>>,
+}
+
+/// Where an arm is.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Configuration {
+    /// One reading per joint [rad or m].
+    pub joints: Vec<f64>,
+    /// How fast they move now [rad/s or m/s].
+    pub velocity: Vec<f64>,
+    /// Links and axes in the world.
+    pub posture: Posture,
+    /// `world_from_camera` of every camera.
+    pub cameras: Vec<Pose>,
+}
+
+impl Arm {
+    /// Of a complete rig.
+    ///
+    /// Errors: [`Error::Unusable`] with the paths of what is missing, or where there is no joint.
+    pub fn new(rig: &Rig) -> Result<Self, Error> {
+        let model = Model::new(rig)?;
+        if model.chain.is_empty() {
+            return Err(Error::Unusable("a rig without joints cannot be moved: give [[robot.joints]]".to_owned()));
+        }
+        Ok(Arm {
+            chain: model.joint_chain(),
+            views: Views::new(&model),
+            limits: rig.robot.joints.iter().map(|joint| joint.limits).collect(),
+            sizes: rig.cameras.iter().map(|camera| camera.size).collect(),
+        })
+    }
+
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        self.chain.len()
+    }
+
+    /// Limits of every joint, as the rig has them.
+    pub fn limits(&self) -> &[Limits] {
+        &self.limits
+    }
+
+    /// Width and height of a camera's images [px], where the rig says so.
+    pub fn size(&self, camera: usize) -> Option<[u32; 2]> {
+        self.sizes.get(camera).copied().flatten()
+    }
+
+    /// Moves a configuration to these joints, one reading each [rad or m]; its velocity stays, and is 0 at first.
+    pub fn configure(&self, joints: &[f64], at: &mut Configuration) {
+        at.joints.clear();
+        at.joints.extend_from_slice(joints);
+        at.velocity.resize(joints.len(), 0.0);
+        self.chain.posture(joints, &mut at.posture);
+        at.cameras.clear();
+        let links = &at.posture.links;
+        at.cameras.extend(self.views.cameras.iter().map(|view| match view.depth {
+            0 => view.pose,
+            depth => links[depth] * view.pose,
+        }));
+    }
+
+    /// Where a camera sees a feature minus the sighting's pixel [px], and the rows of that error by the joints [px/rad or px/m].
+    /// `None` where camera or feature are not of the rig.
+    pub fn pixel_rows(&self, at: &Configuration, sighting: &Sighting, rows: [&mut [f64]; 2]) -> Option<[f64; 2]> {
+        if !self.views.knows(sighting) {
+            return None;
+        }
+        let depth = self.views.features[sighting.feature].depth;
+        let frame = (depth > 0).then(|| &at.posture.links[depth]);
+        let glance = self.views.glance(sighting, frame, &at.cameras[sighting.camera]);
+        let (from, to) = self.views.between(sighting);
+        let sign = if depth == to { 1.0 } else { -1.0 };
+        let [first, second] = rows;
+        first.fill(0.0);
+        second.fill(0.0);
+        // Only joints between camera and feature move the pixel, as if the camera stood still.
+        for i in from..to {
+            let (_, velocity) = of_point(at, i, &glance.point);
+            first[i] = sign * glance.rows[0].dot(&velocity);
+            second[i] = sign * glance.rows[1].dot(&velocity);
+        }
+        Some(glance.error)
+    }
+
+    /// Predicted pixel of a feature [px]; `None` where camera or feature are not of the rig.
+    pub fn pixel(&self, at: &Configuration, camera: usize, feature: usize) -> Option<[f64; 2]> {
+        let origin = Sighting { camera, feature, pixel: [0.0, 0.0] };
+        if !self.views.knows(&origin) {
+            return None;
+        }
+        let depth = self.views.features[feature].depth;
+        let frame = (depth > 0).then(|| &at.posture.links[depth]);
+        Some(self.views.glance(&origin, frame, &at.cameras[camera]).error)
+    }
+}
+
+/// (w, v) of a point [m] beyond joint `i`, both in the world.
+fn of_point(at: &Configuration, i: usize, point: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    at.posture.axes[i].twist(point)
+}

@@ -1,0 +1,106 @@
+//! What tasks and limits write: linear rows in the joints' motion.
+
+/// Rows J Δq ≈ e of the tasks of one priority, each divided by its standard deviation.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TaskRows {
+    n: usize,
+    jacobian: Vec<f64>,
+    errors: Vec<f64>,
+}
+
+/// Rows a·Δq ≤ b of the limits.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LimitRows {
+    n: usize,
+    pub(super) rows: Vec<f64>,
+    pub(super) bounds: Vec<f64>,
+    pub(super) strengths: Vec<f64>,
+    /// Which limit each is of, and its place among that limit's.
+    pub(super) of: Vec<(usize, usize)>,
+}
+
+impl TaskRows {
+    /// None yet, over `n` joints.
+    pub fn clear(&mut self, n: usize) {
+        self.n = n;
+        self.jacobian.clear();
+        self.errors.clear();
+    }
+
+    /// Adds a row: `jacobian`, one entry per joint, times the motion shall be `change`. `sd`: standard deviation in their unit.
+    pub fn push(&mut self, jacobian: &[f64], change: f64, sd: f64) {
+        debug_assert_eq!(jacobian.len(), self.n);
+        self.jacobian.extend(jacobian.iter().map(|slope| slope / sd));
+        self.errors.push(change / sd);
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.errors.len()
+    }
+
+    /// True where there is none.
+    pub fn is_empty(&self) -> bool {
+        self.errors.is_empty()
+    }
+
+    /// A row over its standard deviation: slopes by the joints, and the change that is wanted.
+    pub fn row(&self, i: usize) -> (&[f64], f64) {
+        (&self.jacobian[i * self.n..(i + 1) * self.n], self.errors[i])
+    }
+
+    /// Sum of the squares of e.
+    pub fn errors(&self) -> f64 {
+        self.errors.iter().map(|error| error * error).sum()
+    }
+
+    /// Sum of the squares of J Δq - e.
+    pub fn cost(&self, motion: &[f64]) -> f64 {
+        let rest = |i| {
+            let (slopes, change) = self.row(i);
+            slopes.iter().zip(motion).map(|(slope, step)| slope * step).sum::<f64>() - change
+        };
+        (0..self.len()).map(|i| rest(i).powi(2)).sum()
+    }
+}
+
+impl LimitRows {
+    pub(super) fn clear(&mut self, n: usize) {
+        *self = LimitRows {
+            n,
+            rows: std::mem::take(&mut self.rows),
+            bounds: std::mem::take(&mut self.bounds),
+            strengths: std::mem::take(&mut self.strengths),
+            of: std::mem::take(&mut self.of),
+        };
+        self.rows.clear();
+        self.bounds.clear();
+        self.strengths.clear();
+        self.of.clear();
+    }
+
+    /// Adds a row: `slopes`, one entry per joint, times the motion shall be at most `bound`, in any unit. A `strength` from 1 to 100
+    /// says who gives way where rows cannot all hold: the smaller.
+    pub fn push(&mut self, slopes: &[f64], bound: f64, strength: f64) {
+        debug_assert_eq!(slopes.len(), self.n);
+        self.rows.extend_from_slice(slopes);
+        self.bounds.push(bound);
+        self.strengths.push(strength);
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.bounds.len()
+    }
+
+    /// True where there is none.
+    pub fn is_empty(&self) -> bool {
+        self.bounds.is_empty()
+    }
+
+    /// Names the rows that were added since the last call.
+    pub(super) fn name(&mut self, limit: usize) {
+        let first = self.of.len();
+        self.of.extend((first..self.bounds.len()).map(|row| (limit, row - first)));
+    }
+}
