@@ -283,6 +283,7 @@ fn settings() -> DefaultSettings<f64> {
         .presolve_enable(false)
         .input_sparse_dropzeros(false)
         .equilibrate_enable(false)
+        .iterative_refinement_enable(false)
         .tol_gap_abs(TOLERANCE)
         .tol_gap_rel(TOLERANCE)
         .tol_feas(TOLERANCE)

@@ -1,6 +1,6 @@
 //! A complete rig prepared for control loops, and where it is at a moment.
 use crate::Error;
-use crate::chain::{JointChain, Posture};
+use crate::chain::{Axis, JointChain, Posture};
 use crate::infer::{Sighting, Views};
 use crate::rig::{Limits, Model, Rig};
 use handeye_solvers::Pose;
@@ -26,6 +26,21 @@ pub struct Configuration {
     pub posture: Posture,
     /// `world_from_camera` of every camera.
     pub cameras: Vec<Pose>,
+}
+
+/// A feature in an image.
+#[derive(Clone, Copy, Debug)]
+pub struct Sight<'a> {
+    /// Its predicted pixel minus that of the sighting [px].
+    pub error: [f64; 2],
+    axes: &'a [Axis],
+    /// Slopes of the pixel by the feature's position in the world [px/m].
+    rows: [Vector3<f64>; 2],
+    /// The feature in the world [m].
+    point: Vector3<f64>,
+    /// Joints that move it in the image: from, to before.
+    from: usize,
+    to: usize,
 }
 
 impl Arm {
@@ -74,9 +89,8 @@ impl Arm {
         }));
     }
 
-    /// Where a camera sees a feature minus the sighting's pixel [px], and the rows of that error by the joints [px/rad or px/m].
-    /// `None` where camera or feature are not of the rig.
-    pub fn pixel_rows(&self, at: &Configuration, sighting: &Sighting, rows: [&mut [f64]; 2]) -> Option<[f64; 2]> {
+    /// Where a camera sees a feature, and how that changes with the joints. `None` where camera or feature are not of the rig.
+    pub fn sight<'a>(&self, at: &'a Configuration, sighting: &Sighting) -> Option<Sight<'a>> {
         if !self.views.knows(sighting) {
             return None;
         }
@@ -85,31 +99,23 @@ impl Arm {
         let glance = self.views.glance(sighting, frame, &at.cameras[sighting.camera]);
         let (from, to) = self.views.between(sighting);
         let sign = if depth == to { 1.0 } else { -1.0 };
-        let [first, second] = rows;
-        first.fill(0.0);
-        second.fill(0.0);
-        // Only joints between camera and feature move the pixel, as if the camera stood still.
-        for i in from..to {
-            let (_, velocity) = of_point(at, i, &glance.point);
-            first[i] = sign * glance.rows[0].dot(&velocity);
-            second[i] = sign * glance.rows[1].dot(&velocity);
-        }
-        Some(glance.error)
+        let rows = glance.rows.map(|row| row * sign);
+        Some(Sight { error: glance.error, axes: &at.posture.axes, rows, point: glance.point, from, to })
     }
 
     /// Predicted pixel of a feature [px]; `None` where camera or feature are not of the rig.
     pub fn pixel(&self, at: &Configuration, camera: usize, feature: usize) -> Option<[f64; 2]> {
-        let origin = Sighting { camera, feature, pixel: [0.0, 0.0] };
-        if !self.views.knows(&origin) {
-            return None;
-        }
-        let depth = self.views.features[feature].depth;
-        let frame = (depth > 0).then(|| &at.posture.links[depth]);
-        Some(self.views.glance(&origin, frame, &at.cameras[camera]).error)
+        Some(self.sight(at, &Sighting { camera, feature, pixel: [0.0, 0.0] })?.error)
     }
 }
 
-/// (w, v) of a point [m] beyond joint `i`, both in the world.
-fn of_point(at: &Configuration, i: usize, point: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    at.posture.axes[i].twist(point)
+impl Sight<'_> {
+    /// Slopes of u (`axis` 0) or v (1) by each joint [px/rad or px/m].
+    pub fn slopes(&self, axis: usize) -> impl Iterator<Item = f64> {
+        // Only joints between camera and feature move the pixel, as if the camera stood still.
+        self.axes.iter().enumerate().map(move |(i, joint)| {
+            let moves = (self.from..self.to).contains(&i);
+            if moves { self.rows[axis].dot(&joint.twist(&self.point).1) } else { 0.0 }
+        })
+    }
 }

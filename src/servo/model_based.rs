@@ -21,8 +21,8 @@ pub struct ModelBased {
 /// A branch this much less probable than the best does not explain the pixels.
 const IMPROBABLE: f64 = 0.05;
 
-/// A branch up to this many times as far away as the nearest is as near.
-const AS_NEAR: f64 = 2.0;
+/// Branches whose pixels differ from the target's by less than this more than the best are as near [px].
+const AS_NEAR: f64 = 1e-3;
 
 impl ModelBased {
     /// With a complete rig.
@@ -55,12 +55,12 @@ impl ModelBased {
         let now = self.nearest(seen, near)?;
         if self.target.joints.is_empty() {
             let goal = std::mem::take(&mut self.goal);
-            let found = self.nearest(&goal, &now.joints);
+            let found = self.best(&goal, &now.joints);
             self.goal = goal;
             self.target.joints = found?.joints;
         }
         self.arm.configure(&now.joints, &mut self.at);
-        let goals = [Goal { task: &self.target, priority: 0 }];
+        let goals = [Goal::new(&self.target)];
         let step = self.stepper.step(&self.arm, &self.at, &goals, limits, dt);
         for (velocity, motion) in self.at.velocity.iter_mut().zip(&step.motion) {
             *velocity = motion / dt;
@@ -78,17 +78,31 @@ impl ModelBased {
         &self.target.joints
     }
 
-    /// Of the branches that may explain the pixels and are near some joints, the one that explains them best.
+    /// Of the branches that may explain the pixels, the one nearest to some joints.
     fn nearest(&mut self, seen: &[Sighting], near: &[f64]) -> Result<Branch, Error> {
-        let away = |branch: &Branch| -> f64 {
-            branch.joints.iter().zip(near).map(|(joint, near)| (joint - near).powi(2)).sum()
-        };
-        let all = self.inference.joints(seen, &Prior::start(near))?;
-        let most = all.iter().map(|branch| branch.probability).fold(0.0, f64::max);
-        let explains = |branch: &Branch| branch.probability >= IMPROBABLE * most;
-        let nearest = all.iter().filter(|branch| explains(branch)).map(away).fold(f64::INFINITY, f64::min);
-        let as_near = |branch: &Branch| explains(branch) && away(branch) <= AS_NEAR * AS_NEAR * nearest;
-        let found = all.into_iter().filter(as_near).min_by(|a, b| a.rms_px.total_cmp(&b.rms_px));
-        found.ok_or_else(|| Error::NotEnoughData("no joints explain what was seen".to_owned()))
+        let plausible = self.plausible(seen, near)?;
+        let nearest = plausible.into_iter().min_by(|a, b| away(a, near).total_cmp(&away(b, near)));
+        nearest.ok_or_else(|| Error::NotEnoughData("no joints explain what was seen".to_owned()))
     }
+
+    /// The branch that comes nearest to the pixels; of those that come as near, the one nearest to some joints.
+    fn best(&mut self, aimed_at: &[Sighting], near: &[f64]) -> Result<Branch, Error> {
+        let plausible = self.plausible(aimed_at, near)?;
+        let least = plausible.iter().map(|branch| branch.rms_px).fold(f64::INFINITY, f64::min);
+        let as_near = plausible.into_iter().filter(|branch| branch.rms_px <= least + AS_NEAR);
+        let best = as_near.min_by(|a, b| away(a, near).total_cmp(&away(b, near)));
+        best.ok_or_else(|| Error::NotEnoughData("no joints lead to the pixels that are aimed at".to_owned()))
+    }
+
+    fn plausible(&mut self, seen: &[Sighting], near: &[f64]) -> Result<Vec<Branch>, Error> {
+        let mut all = self.inference.joints(seen, &Prior::start(near))?;
+        let most = all.iter().map(|branch| branch.probability).fold(0.0, f64::max);
+        all.retain(|branch| branch.probability >= IMPROBABLE * most);
+        Ok(all)
+    }
+}
+
+/// Squared distance of a branch's joints from others.
+fn away(branch: &Branch, near: &[f64]) -> f64 {
+    branch.joints.iter().zip(near).map(|(joint, near)| (joint - near).powi(2)).sum()
 }

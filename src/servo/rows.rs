@@ -6,6 +6,8 @@ pub struct TaskRows {
     n: usize,
     jacobian: Vec<f64>,
     errors: Vec<f64>,
+    /// The share of each error that one step shall take away.
+    shares: Vec<f64>,
 }
 
 /// Rows a·Δq ≤ b of the limits.
@@ -25,13 +27,15 @@ impl TaskRows {
         self.n = n;
         self.jacobian.clear();
         self.errors.clear();
+        self.shares.clear();
     }
 
-    /// Adds a row: `jacobian`, one entry per joint, times the motion shall be `change`. `sd`: standard deviation in their unit.
-    pub fn push(&mut self, jacobian: &[f64], change: f64, sd: f64) {
-        debug_assert_eq!(jacobian.len(), self.n);
-        self.jacobian.extend(jacobian.iter().map(|slope| slope / sd));
+    /// Adds a row: `slopes`, one per joint, times the motion shall be `change`. `sd`: standard deviation in their unit.
+    pub fn push(&mut self, slopes: impl IntoIterator<Item = f64>, change: f64, sd: f64) {
+        self.jacobian.extend(slopes.into_iter().map(|slope| slope / sd));
         self.errors.push(change / sd);
+        self.shares.push(1.0);
+        debug_assert_eq!(self.jacobian.len(), self.n * self.errors.len());
     }
 
     /// Number of rows.
@@ -47,6 +51,16 @@ impl TaskRows {
     /// A row over its standard deviation: slopes by the joints, and the change that is wanted.
     pub fn row(&self, i: usize) -> (&[f64], f64) {
         (&self.jacobian[i * self.n..(i + 1) * self.n], self.errors[i])
+    }
+
+    /// What one step shall do of a row's error.
+    pub(super) fn wanted(&self, i: usize) -> f64 {
+        self.shares[i] * self.errors[i]
+    }
+
+    /// Lets one step take away this share only of the errors from the row `first` on.
+    pub(super) fn share(&mut self, first: usize, share: f64) {
+        self.shares[first..].fill(share);
     }
 
     /// Sum of the squares of e.
@@ -66,26 +80,20 @@ impl TaskRows {
 
 impl LimitRows {
     pub(super) fn clear(&mut self, n: usize) {
-        *self = LimitRows {
-            n,
-            rows: std::mem::take(&mut self.rows),
-            bounds: std::mem::take(&mut self.bounds),
-            strengths: std::mem::take(&mut self.strengths),
-            of: std::mem::take(&mut self.of),
-        };
+        self.n = n;
         self.rows.clear();
         self.bounds.clear();
         self.strengths.clear();
         self.of.clear();
     }
 
-    /// Adds a row: `slopes`, one entry per joint, times the motion shall be at most `bound`, in any unit. A `strength` from 1 to 100
+    /// Adds a row: `slopes`, one per joint, times the motion shall be at most `bound`, in any unit. A `strength` from 1 to 100
     /// says who gives way where rows cannot all hold: the smaller.
-    pub fn push(&mut self, slopes: &[f64], bound: f64, strength: f64) {
-        debug_assert_eq!(slopes.len(), self.n);
-        self.rows.extend_from_slice(slopes);
+    pub fn push(&mut self, slopes: impl IntoIterator<Item = f64>, bound: f64, strength: f64) {
+        self.rows.extend(slopes);
         self.bounds.push(bound);
         self.strengths.push(strength);
+        debug_assert_eq!(self.rows.len(), self.n * self.bounds.len());
     }
 
     /// Number of rows.

@@ -28,6 +28,16 @@ pub struct Goal<'a> {
     /// 0 comes first. A goal moves only in what those of smaller numbers leave open; of one number, goals share by their standard
     /// deviations.
     pub priority: usize,
+    /// Share of the error that a step shall take away, in (0, 1]. 1 arrives with one step where nothing holds it back. A loop whose
+    /// joints cannot stop at once wants 1 - exp(-r dt): errors fall by the rate r [1/s], and the last of them slowly.
+    pub share: f64,
+}
+
+impl<'a> Goal<'a> {
+    /// To be reached at once, before all others.
+    pub fn new(task: &'a dyn Task) -> Self {
+        Goal { task, priority: 0, share: 1.0 }
+    }
 }
 
 /// A motion, and what it is worth.
@@ -130,7 +140,9 @@ impl Stepper {
         loop {
             self.tasks.clear(n);
             for goal in goals.iter().filter(|goal| goal.priority == priority) {
+                let first = self.tasks.len();
                 goal.task.rows(arm, at, &mut self.tasks);
+                self.tasks.share(first, goal.share);
             }
             let before = self.tasks.errors();
             match &open {
@@ -241,10 +253,10 @@ impl Stepper {
         self.gradient.resize(n, 0.0);
         let mut squares = 0.0;
         for index in 0..self.tasks.len() {
-            let (row, error) = self.tasks.row(index);
+            let ((row, error), wanted) = (self.tasks.row(index), self.tasks.wanted(index));
             squares += error * error;
             for i in 0..n {
-                self.gradient[i] -= row[i] * error;
+                self.gradient[i] -= row[i] * wanted;
                 let columns = &mut self.hessian[i * n..i * n + i + 1];
                 columns.iter_mut().zip(row).for_each(|(entry, slope)| *entry += row[i] * slope);
             }

@@ -96,7 +96,7 @@ fn tasks_arrive_from_nearby_and_lower_priorities_move_only_what_is_left() {
         arm.configure(&goal, &mut at);
         let pose = TipPose { target: at.posture.tip(), xyz_sd: 0.001, rot_sd: 0.001 };
         let posture = JointTarget { joints: goal.iter().map(|joint| joint + 0.2).collect(), sd: 0.1 };
-        let goals = [Goal { task: &pose, priority: 0 }, Goal { task: &posture, priority: 1 }];
+        let goals = [Goal::new(&pose), Goal { priority: 1, ..Goal::new(&posture) }];
         let mut stepper = Stepper::default();
         for _ in 0..200 {
             arm.configure(&joints, &mut at);
@@ -126,7 +126,7 @@ fn looking_at_a_point_turns_the_axis_onto_it() {
         let task = LookAt { point, axis: Vector3::z(), sd: 0.01 };
         for _ in 0..300 {
             arm.configure(&joints, &mut at);
-            let step = stepper.step(&arm, &at, &[Goal { task: &task, priority: 0 }], &[], 0.05);
+            let step = stepper.step(&arm, &at, &[Goal::new(&task)], &[], 0.05);
             moved(&mut joints, &step.motion);
         }
         arm.configure(&joints, &mut at);
@@ -185,7 +185,7 @@ fn limits_hold_in_every_step_and_nothing_is_ever_returned_that_is_not_finite() {
         let mut stayed = true;
         for index in 0..60 {
             arm.configure(&joints, &mut at);
-            let step = stepper.step(&arm, &at, &[Goal { task: &task, priority: 0 }], &limits, dt).clone();
+            let step = stepper.step(&arm, &at, &[Goal::new(&task)], &limits, dt).clone();
             assert!(!step.failed, "seed {seed}, step {index}");
             for (i, (motion, limits)) in step.motion.iter().zip(arm.limits()).enumerate() {
                 let (before, after) = (joints[i], joints[i] + motion);
@@ -232,11 +232,11 @@ fn what_holds_a_motion_back_is_named() {
     arm.configure(&joints, &mut at);
     let target = JointTarget { joints: joints.iter().map(|joint| joint + 0.01).collect(), sd: 0.1 };
     let mut stepper = Stepper::default();
-    let step = stepper.step(&arm, &at, &[Goal { task: &target, priority: 0 }], &[], 0.01);
+    let step = stepper.step(&arm, &at, &[Goal::new(&target)], &[], 0.01);
     let held: Vec<Constraint> = step.active.iter().map(|active| active.constraint).collect();
     assert_eq!(held, [Constraint::Joint { joint: 2, bound: Bound::Velocity, upper: true }]);
     assert!((step.motion[2] - 0.001).abs() < 1e-9);
     at.joints[3] = f64::NAN;
-    let step = stepper.step(&arm, &at, &[Goal { task: &target, priority: 0 }], &[], 0.01);
+    let step = stepper.step(&arm, &at, &[Goal::new(&target)], &[], 0.01);
     assert!(step.failed && step.motion.iter().all(|motion| *motion == 0.0));
 }

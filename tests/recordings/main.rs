@@ -5,6 +5,7 @@ mod doctor;
 mod dvrk;
 mod franka;
 mod peers;
+mod servo;
 mod ur3e;
 
 use handeye::calibrate::{Calibration, Options, calibrate};

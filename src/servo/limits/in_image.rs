@@ -18,19 +18,16 @@ pub struct InImage {
 impl Limit for InImage {
     fn rows(&self, arm: &Arm, at: &Configuration, _dt: f64, rows: &mut LimitRows) {
         let Some(size) = arm.size(self.camera) else { return };
-        let n = arm.joints();
-        let mut slopes = vec![0.0; 3 * n];
         for &feature in &self.features {
-            let (first, rest) = slopes.split_at_mut(n);
-            let (second, negative) = rest.split_at_mut(n);
-            let sighting = Sighting { camera: self.camera, feature, pixel: [0.0, 0.0] };
-            let Some(pixel) = arm.pixel_rows(at, &sighting, [first, second]) else { continue };
-            for (axis, row) in [&*first, &*second].into_iter().enumerate() {
+            let Some(sight) = arm.sight(at, &Sighting { camera: self.camera, feature, pixel: [0.0, 0.0] }) else {
+                continue;
+            };
+            for (axis, &size) in size.iter().enumerate() {
                 // Pixel centres are at whole numbers.
-                let (low, high) = (self.margin - 0.5, f64::from(size[axis]) - 0.5 - self.margin);
-                rows.push(row, SHARE * (high - pixel[axis]), self.strength);
-                negative.iter_mut().zip(row).for_each(|(negative, slope)| *negative = -slope);
-                rows.push(negative, SHARE * (pixel[axis] - low), self.strength);
+                let (low, high) = (self.margin - 0.5, f64::from(size) - 0.5 - self.margin);
+                let pixel = sight.error[axis];
+                rows.push(sight.slopes(axis), SHARE * (high - pixel), self.strength);
+                rows.push(sight.slopes(axis).map(|slope| -slope), SHARE * (pixel - low), self.strength);
             }
         }
     }

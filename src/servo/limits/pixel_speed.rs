@@ -17,18 +17,13 @@ pub struct PixelSpeed {
 
 impl Limit for PixelSpeed {
     fn rows(&self, arm: &Arm, at: &Configuration, dt: f64, rows: &mut LimitRows) {
-        let n = arm.joints();
-        let mut slopes = vec![0.0; 2 * n];
         for &feature in &self.features {
-            let (first, second) = slopes.split_at_mut(n);
-            let sighting = Sighting { camera: self.camera, feature, pixel: [0.0, 0.0] };
-            if arm.pixel_rows(at, &sighting, [first, second]).is_none() {
+            let Some(sight) = arm.sight(at, &Sighting { camera: self.camera, feature, pixel: [0.0, 0.0] }) else {
                 continue;
-            }
-            for row in [first, second] {
-                rows.push(row, self.speed * dt, self.strength);
-                row.iter_mut().for_each(|slope| *slope = -*slope);
-                rows.push(row, self.speed * dt, self.strength);
+            };
+            for axis in 0..2 {
+                rows.push(sight.slopes(axis), self.speed * dt, self.strength);
+                rows.push(sight.slopes(axis).map(|slope| -slope), self.speed * dt, self.strength);
             }
         }
     }

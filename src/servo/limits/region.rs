@@ -16,7 +16,7 @@ pub struct HalfSpace {
 impl Limit for HalfSpace {
     fn rows(&self, _arm: &Arm, at: &Configuration, _dt: f64, rows: &mut LimitRows) {
         let tip = at.posture.tip().translation;
-        let row: Vec<f64> = at.posture.axes.iter().map(|axis| self.normal.dot(&axis.twist(&tip).1)).collect();
-        rows.push(&row, SHARE * (self.offset - self.normal.dot(&tip)), self.strength);
+        let slopes = at.posture.axes.iter().map(|axis| self.normal.dot(&axis.twist(&tip).1));
+        rows.push(slopes, SHARE * (self.offset - self.normal.dot(&tip)), self.strength);
     }
 }

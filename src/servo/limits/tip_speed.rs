@@ -34,8 +34,7 @@ impl Limit for TipSpeed {
             let direction = Vector3::from(face).normalize();
             for sign in [1.0, -1.0] {
                 let slope = |axis: &crate::chain::Axis| sign * direction.dot(&axis.twist(&tip).1);
-                let row: Vec<f64> = at.posture.axes.iter().map(slope).collect();
-                rows.push(&row, bound, self.strength);
+                rows.push(at.posture.axes.iter().map(slope), bound, self.strength);
             }
         }
     }

@@ -1,7 +1,6 @@
 //! Features to pixels.
 use super::{Arm, Configuration, Task, TaskRows};
 use crate::infer::Sighting;
-use std::cell::RefCell;
 
 /// Brings features to pixels, in any number of cameras: π(q) + J Δq = target.
 ///
@@ -16,25 +15,16 @@ pub struct ImagePoints {
     pub sd: f64,
 }
 
-thread_local! {
-    /// Two rows, kept so that none but a thread's first step allocates.
-    static ROWS: RefCell<[Vec<f64>; 2]> = RefCell::default();
-}
-
 impl Task for ImagePoints {
     fn rows(&self, arm: &Arm, at: &Configuration, rows: &mut TaskRows) {
-        ROWS.with_borrow_mut(|[first, second]| {
-            first.resize(arm.joints(), 0.0);
-            second.resize(arm.joints(), 0.0);
-            for target in &self.targets {
-                let Some(mut error) = arm.pixel_rows(at, target, [first, second]) else { continue };
-                let same = |seen: &&Sighting| (seen.camera, seen.feature) == (target.camera, target.feature);
-                if let Some(seen) = self.seen.iter().find(same) {
-                    error = [seen.pixel[0] - target.pixel[0], seen.pixel[1] - target.pixel[1]];
-                }
-                rows.push(first, -error[0], self.sd);
-                rows.push(second, -error[1], self.sd);
+        for target in &self.targets {
+            let Some(sight) = arm.sight(at, target) else { continue };
+            let same = |seen: &&Sighting| (seen.camera, seen.feature) == (target.camera, target.feature);
+            let seen = self.seen.iter().find(same);
+            for axis in 0..2 {
+                let error = seen.map_or(sight.error[axis], |seen| seen.pixel[axis] - target.pixel[axis]);
+                rows.push(sight.slopes(axis), -error, self.sd);
             }
-        });
+        }
     }
 }

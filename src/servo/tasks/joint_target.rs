@@ -12,21 +12,10 @@ pub struct JointTarget {
 
 impl Task for JointTarget {
     fn rows(&self, arm: &Arm, at: &Configuration, rows: &mut TaskRows) {
-        let mut row = [0.0; 32];
         let n = arm.joints();
-        for (i, (&target, &joint)) in self.joints.iter().zip(&at.joints).enumerate() {
-            if target.is_nan() {
-                continue;
-            }
-            // An arm of more joints than anybody has built takes an allocation.
-            if n <= row.len() {
-                row[i] = 1.0;
-                rows.push(&row[..n], target - joint, self.sd);
-                row[i] = 0.0;
-            } else {
-                let unit: Vec<f64> = (0..n).map(|k| if k == i { 1.0 } else { 0.0 }).collect();
-                rows.push(&unit, target - joint, self.sd);
-            }
+        let known = self.joints.iter().zip(&at.joints).take(n).enumerate().filter(|(_, (target, _))| !target.is_nan());
+        for (i, (target, joint)) in known {
+            rows.push((0..n).map(|k| if k == i { 1.0 } else { 0.0 }), target - joint, self.sd);
         }
     }
 }

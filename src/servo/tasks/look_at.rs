@@ -18,7 +18,7 @@ pub struct LookAt {
 const NEAREST: f64 = 1e-6;
 
 impl Task for LookAt {
-    fn rows(&self, arm: &Arm, at: &Configuration, rows: &mut TaskRows) {
+    fn rows(&self, _arm: &Arm, at: &Configuration, rows: &mut TaskRows) {
         let tip = at.posture.tip();
         let from_tip = self.point - tip.translation;
         let distance = from_tip.norm();
@@ -28,15 +28,14 @@ impl Task for LookAt {
         }
         let direction = from_tip / distance;
         let wanted = direction - axis;
-        let mut row = vec![0.0; arm.joints()];
         for k in 0..3 {
-            for (entry, joint) in row.iter_mut().zip(&at.posture.axes) {
+            let slopes = at.posture.axes.iter().map(|joint| {
                 let (w, v) = joint.twist(&tip.translation);
                 // The axis turns with the tip; the line of sight turns as the tip moves across it.
                 let across = v - direction * direction.dot(&v);
-                *entry = (w.cross(&axis) + across / distance)[k];
-            }
-            rows.push(&row, wanted[k], self.sd);
+                (w.cross(&axis) + across / distance)[k]
+            });
+            rows.push(slopes, wanted[k], self.sd);
         }
     }
 }

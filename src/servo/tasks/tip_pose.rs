@@ -15,21 +15,17 @@ pub struct TipPose {
 }
 
 impl Task for TipPose {
-    fn rows(&self, arm: &Arm, at: &Configuration, rows: &mut TaskRows) {
+    fn rows(&self, _arm: &Arm, at: &Configuration, rows: &mut TaskRows) {
         let tip = at.posture.tip();
         let away = self.target.translation - tip.translation;
         let turn = so3::log(&(self.target.rotation * tip.rotation.transpose()));
-        let mut row = vec![0.0; arm.joints()];
+        let twists = || at.posture.axes.iter().map(|axis| axis.twist(&tip.translation));
         for k in 0..3 {
             if self.xyz_sd.is_finite() {
-                let velocity = |axis: &crate::chain::Axis| axis.twist(&tip.translation).1[k];
-                row.iter_mut().zip(&at.posture.axes).for_each(|(entry, axis)| *entry = velocity(axis));
-                rows.push(&row, away[k], self.xyz_sd);
+                rows.push(twists().map(|(_, v)| v[k]), away[k], self.xyz_sd);
             }
             if self.rot_sd.is_finite() {
-                let rate = |axis: &crate::chain::Axis| axis.twist(&tip.translation).0[k];
-                row.iter_mut().zip(&at.posture.axes).for_each(|(entry, axis)| *entry = rate(axis));
-                rows.push(&row, turn[k], self.rot_sd);
+                rows.push(twists().map(|(w, _)| w[k]), turn[k], self.rot_sd);
             }
         }
     }
