@@ -16,10 +16,12 @@ pub struct ModelBased {
     at: Configuration,
     target: JointTarget,
     goal: Vec<Sighting>,
+    /// Standard deviation of a pixel coordinate [px].
+    sigma: f64,
 }
 
-/// A branch this much less probable than the best does not explain the pixels.
-const IMPROBABLE: f64 = 0.05;
+/// A branch does not explain the pixels where they are e to this power less likely than by the best.
+const UNLIKELY: f64 = 3.0;
 
 /// Branches whose pixels differ from the target's by less than this more than the best are as near [px].
 const AS_NEAR: f64 = 1e-3;
@@ -36,6 +38,7 @@ impl ModelBased {
             at: Configuration::default(),
             target: JointTarget { joints: Vec::new(), sd: 1.0 },
             goal: Vec::new(),
+            sigma: rig.noise.pixels.max(AS_NEAR),
         })
     }
 
@@ -96,8 +99,10 @@ impl ModelBased {
 
     fn plausible(&mut self, seen: &[Sighting], near: &[f64]) -> Result<Vec<Branch>, Error> {
         let mut all = self.inference.joints(seen, &Prior::start(near))?;
-        let most = all.iter().map(|branch| branch.probability).fold(0.0, f64::max);
-        all.retain(|branch| branch.probability >= IMPROBABLE * most);
+        // By the pixels alone: that more joints near by explain them as well, as at a singularity, does not make a branch better.
+        let misfit = |branch: &Branch| 0.5 * seen.len() as f64 * (branch.rms_px / self.sigma).powi(2);
+        let least = all.iter().map(misfit).fold(f64::INFINITY, f64::min);
+        all.retain(|branch| misfit(branch) <= least + UNLIKELY);
         Ok(all)
     }
 }
