@@ -2,7 +2,7 @@
 use handeye::chain::JointKind;
 use handeye::infer::Sighting;
 use handeye::rig::{Limits, Rig, catalog};
-use handeye::servo::limits::{HalfSpace, InImage, PixelSpeed, TipSpeed};
+use handeye::servo::limits::{HalfSpace, InImage, LinkDistance, PixelSpeed, TipSpeed};
 use handeye::servo::tasks::{ImagePoints, JointTarget, LookAt, TipPose};
 use handeye::servo::{Arm, Bound, Configuration, Constraint, Goal, Limit, ModelBased, Stepper};
 use handeye::simulate::{SimulateOptions, random_rig, simulate};
@@ -227,6 +227,35 @@ fn limits_hold_in_every_step_and_nothing_is_ever_returned_that_is_not_finite() {
         }
     }
     assert!(100 * in_view >= 99 * loops, "features stayed in the images of {in_view} of {loops} loops");
+}
+
+#[test]
+fn links_keep_their_distance_on_the_way_to_where_they_would_meet() {
+    let rig = catalog::rig("ur5").unwrap();
+    let arm = Arm::new(&rig).unwrap();
+    let mut pressed = 0;
+    for (trial, mut joints) in positions(&rig, 20, 6).into_iter().enumerate() {
+        let mut at = Configuration::default();
+        arm.configure(&joints, &mut at);
+        // To the middle of the upper arm, which the tip must not come nearer to than 15 cm.
+        let middle = Vector3::new(0.2, 0.0, 0.0);
+        let apart = LinkDistance { links: [6, 2], points: [Vector3::zeros(), middle], distance: 0.15, strength: 10.0 };
+        let mut stepper = Stepper::default();
+        for index in 0..400 {
+            arm.configure(&joints, &mut at);
+            let mut target = at.posture.tip();
+            target.translation = at.posture.links[2].transform(&middle);
+            let task = TipPose { target, xyz_sd: 0.01, rot_sd: f64::INFINITY };
+            let goals = [Goal { share: 0.05, ..Goal::new(&task) }];
+            let step = stepper.step(&arm, &at, &goals, &[&apart], 0.01);
+            pressed += usize::from(index == 399 && !step.active.is_empty());
+            moved(&mut joints, &step.motion);
+            arm.configure(&joints, &mut at);
+            let between = at.posture.tip().translation - at.posture.links[2].transform(&middle);
+            assert!(between.norm() > 0.15 - 1e-3, "trial {trial}: {} m in step {index}", between.norm());
+        }
+    }
+    assert!(pressed > 10, "the tip came up against the arm in {pressed} of 20 loops only");
 }
 
 #[test]

@@ -2,11 +2,13 @@
 //!
 //! A limit that is broken pulls back: its rows ask for a share of the way inside.
 mod in_image;
+mod link_distance;
 mod pixel_speed;
 mod region;
 mod tip_speed;
 
 pub use in_image::InImage;
+pub use link_distance::LinkDistance;
 pub use pixel_speed::PixelSpeed;
 pub use region::HalfSpace;
 pub use tip_speed::TipSpeed;
