@@ -5,11 +5,14 @@
 use cpu_time::ThreadTime;
 use handeye::chain::Convention;
 use handeye::infer::{InverseKinematics, InverseOptions};
-use handeye::rig::{Joint, Limits, Model, Rig};
+use handeye::rig::{Limits, Model, Rig};
 use handeye::solvers::{Pose, manifold::so3};
 use nalgebra::Vector3;
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
+
+#[path = "common/dh_rows.rs"]
+mod dh_rows;
 
 /// What counts as reached [m, rad], and the required times [µs]: median and 99 %.
 const REACHED: f64 = 1e-5;
@@ -63,16 +66,8 @@ fn rig(cases: &Value) -> Rig {
     let mut rig = Rig::default();
     rig.robot.convention = if cases["dh_convention"] == "standard" { Convention::Dh } else { Convention::ModifiedDh };
     for (i, (row, limits)) in rows(&cases["dh"]).iter().zip(rows(&cases["limits"])).enumerate() {
-        let [offset, d, a, alpha] = row[..] else { panic!("a row has 4 numbers") };
-        rig.robot.joints.push(Joint {
-            name: format!("j{i}"),
-            offset: Some(offset),
-            d: Some(d),
-            a: Some(a),
-            alpha: Some(alpha),
-            limits: Limits { lower: Some(limits[0]), upper: Some(limits[1]), ..Limits::default() },
-            ..Joint::default()
-        });
+        let limits = Limits { lower: Some(limits[0]), upper: Some(limits[1]), ..Limits::default() };
+        rig.robot.joints.push(dh_rows::joint(i, row, limits));
     }
     rig
 }

@@ -1,8 +1,11 @@
 //! The servoing problems that ViSP was measured on, as rigs: `cases/servo_ur5.json`.
-use handeye::rig::{Camera, Feature, Joint, Limits, Parent, Rig};
+use handeye::rig::{Camera, Feature, Limits, Parent, Rig};
 use handeye::solvers::Pose;
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
+
+#[path = "dh_rows.rs"]
+mod dh_rows;
 
 /// A set of problems: start and target joints [rad] of one rig.
 pub struct Cases {
@@ -18,16 +21,7 @@ impl Cases {
         let mut rig = Rig::default();
         rig.robot.base = Some(Pose::identity());
         for (i, row) in list(&all["robot"]["dh"]).iter().enumerate() {
-            let [offset, d, a, alpha] = numbers(row)[..] else { panic!("a row has four numbers") };
-            rig.robot.joints.push(Joint {
-                name: format!("j{i}"),
-                offset: Some(offset),
-                d: Some(d),
-                a: Some(a),
-                alpha: Some(alpha),
-                limits: Limits::default(),
-                ..Joint::default()
-            });
+            rig.robot.joints.push(dh_rows::joint(i, &numbers(row), Limits::default()));
         }
         let lens = &all["camera_intrinsics"];
         let number = |key: &str| lens[key].as_f64();

@@ -52,6 +52,17 @@ impl JointBox {
         }
     }
 
+    /// How far every joint may move down and up from its reading.
+    pub fn rooms(&self, joints: &[f64], lower: &mut Vec<f64>, upper: &mut Vec<f64>) {
+        lower.clear();
+        upper.clear();
+        for (joint, &reading) in joints.iter().enumerate() {
+            let (down, up) = self.room(joint, reading);
+            lower.push(down);
+            upper.push(up);
+        }
+    }
+
     /// The nearest readings inside the limits, of those that turn the equal one nearest to `near`.
     pub fn bring_inside(&self, joints: &mut [f64], near: &[f64]) {
         for (i, reading) in joints.iter_mut().enumerate() {

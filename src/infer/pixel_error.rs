@@ -107,13 +107,7 @@ impl PixelError {
     /// The damped step from where [`PixelError::look`] was, inside the limits; `None` where it is not finite.
     pub fn step(&mut self, limits: &JointBox, joints: &[f64], lambda: f64) -> Option<&[f64]> {
         let n = joints.len();
-        self.lower.clear();
-        self.upper.clear();
-        for (i, &joint) in joints.iter().enumerate() {
-            let (down, up) = limits.room(i, joint);
-            self.lower.push(down);
-            self.upper.push(up);
-        }
+        limits.rooms(joints, &mut self.lower, &mut self.upper);
         // In proportion to how well the joint is seen on its own.
         let mean = (0..n).map(|i| self.total[i * n + i]).sum::<f64>() / n.max(1) as f64;
         let solved = self.program.solve(&self.total, &self.gradient, lambda * mean, &self.lower, &self.upper);

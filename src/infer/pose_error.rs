@@ -140,13 +140,7 @@ impl PoseError {
 
     #[inline]
     fn solve(&mut self, limits: &JointBox, joints: &[f64], damping: f64) -> Option<&[f64]> {
-        self.lower.clear();
-        self.upper.clear();
-        for (i, &joint) in joints.iter().enumerate() {
-            let (down, up) = limits.room(i, joint);
-            self.lower.push(down);
-            self.upper.push(up);
-        }
+        limits.rooms(joints, &mut self.lower, &mut self.upper);
         let solved = self.program.solve(&self.hessian, &self.gradient, damping, &self.lower, &self.upper);
         solved.then_some(&self.program.step)
     }
