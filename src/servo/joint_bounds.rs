@@ -1,5 +1,5 @@
 //! Position, velocity and acceleration of the joints, merged into one box of motions.
-use super::arm::{Arm, Configuration};
+use crate::rig::Limits;
 
 /// What bounds the motion of a joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -17,23 +17,26 @@ pub enum Bound {
 
 /// A box of motions [rad or m] that never is empty, and what made each side.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct JointBounds {
+pub struct JointBounds {
+    /// Least motion of every joint.
     pub lower: Vec<f64>,
+    /// Largest motion of every joint.
     pub upper: Vec<f64>,
+    /// What made `lower`.
     pub of_lower: Vec<Bound>,
+    /// What made `upper`.
     pub of_upper: Vec<Bound>,
 }
 
 impl JointBounds {
-    /// Of the next `dt` seconds. The range is hard: from outside, the motion may only lead back. Speed comes before acceleration, and
+    /// Of the next `dt` seconds, for joints at readings and velocities [rad and rad/s, or m and m/s], one each. The range is hard: from outside, the motion may only lead back. Speed comes before acceleration, and
     /// the range before both, where they cannot all hold.
-    pub fn update(&mut self, arm: &Arm, at: &Configuration, dt: f64) {
+    pub fn update(&mut self, limits: &[Limits], joints: &[f64], velocity: &[f64], dt: f64) {
         self.lower.clear();
         self.upper.clear();
         self.of_lower.clear();
         self.of_upper.clear();
-        for (i, limits) in arm.limits().iter().enumerate() {
-            let (joint, speed) = (at.joints[i], at.velocity[i]);
+        for ((limits, joint), &speed) in limits.iter().zip(joints).zip(velocity) {
             let room_up = limits.upper.map_or(f64::INFINITY, |upper| upper - joint);
             let room_down = limits.lower.map_or(f64::INFINITY, |lower| joint - lower);
             let fastest = limits.velocity.unwrap_or(f64::INFINITY) * dt;

@@ -19,6 +19,8 @@ pub struct LimitRows {
     pub(super) strengths: Vec<f64>,
     /// Which limit each is of, and its place among that limit's.
     pub(super) of: Vec<(usize, usize)>,
+    /// The limit that adds rows now, and where its first one is.
+    now: (usize, usize),
 }
 
 impl TaskRows {
@@ -59,7 +61,7 @@ impl TaskRows {
     }
 
     /// Lets one step take away this share only of the errors from the row `first` on.
-    pub(super) fn share(&mut self, first: usize, share: f64) {
+    pub fn share(&mut self, first: usize, share: f64) {
         self.shares[first..].fill(share);
     }
 
@@ -79,8 +81,10 @@ impl TaskRows {
 }
 
 impl LimitRows {
-    pub(super) fn clear(&mut self, n: usize) {
+    /// None yet, over `n` joints.
+    pub fn clear(&mut self, n: usize) {
         self.n = n;
+        self.now = (0, 0);
         self.rows.clear();
         self.bounds.clear();
         self.strengths.clear();
@@ -90,6 +94,8 @@ impl LimitRows {
     /// Adds a row: `slopes`, one per joint, times the motion shall be at most `bound`, in any unit. A `strength` from 1 to 100
     /// says who gives way where rows cannot all hold: the smaller.
     pub fn push(&mut self, slopes: impl IntoIterator<Item = f64>, bound: f64, strength: f64) {
+        let (limit, first) = self.now;
+        self.of.push((limit, self.len() - first));
         self.rows.extend(slopes);
         self.bounds.push(bound);
         self.strengths.push(strength);
@@ -106,9 +112,8 @@ impl LimitRows {
         self.bounds.is_empty()
     }
 
-    /// Names the rows that were added since the last call.
-    pub(super) fn name(&mut self, limit: usize) {
-        let first = self.of.len();
-        self.of.extend((first..self.bounds.len()).map(|row| (limit, row - first)));
+    /// The rows that follow are of the limit of that index.
+    pub fn begin(&mut self, limit: usize) {
+        self.now = (limit, self.len());
     }
 }

@@ -1,23 +1,14 @@
-//! One step: where tasks, limits and the joints' bounds meet.
-use super::joint_bounds::{Bound, JointBounds};
-use super::{Arm, Configuration, Limit, LimitRows, Task, TaskRows};
-use handeye_solvers::{Qp, QpEnd, QuadraticProgram};
-use nalgebra::{DMatrix, DVector};
+//! One step of a rig: rows gathered from tasks and limits, and the motion that meets them.
+use super::motion_solver::{MotionSolver, Step};
+use super::{Arm, Configuration, JointBounds, Limit, LimitRows, Task, TaskRows};
 
-/// Finds motions; kept from step to step. `Send`.
+/// Finds motions of a rig; kept from step to step. `Send`.
 pub struct Stepper {
-    /// Share of the squared errors by which H is damped, (1 rad or 1 m)⁻²: where errors are large or the arm is near a singularity,
-    /// motions are shorter; near the goal, whole Gauss-Newton steps.
-    pub damping: f64,
+    solver: MotionSolver,
     bounds: JointBounds,
-    tasks: TaskRows,
+    /// One entry per priority; those beyond the goals of a step are kept for the next.
+    tasks: Vec<TaskRows>,
     limits: LimitRows,
-    hessian: Vec<f64>,
-    gradient: Vec<f64>,
-    program: QuadraticProgram,
-    /// Programs of the lower priorities, found by their shape.
-    lower: Vec<QuadraticProgram>,
-    step: Step,
 }
 
 /// A task and how strictly it comes before others.
@@ -40,57 +31,6 @@ impl<'a> Goal<'a> {
     }
 }
 
-/// A motion, and what it is worth.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Step {
-    /// Motion of every joint [rad or m]: finite, and inside the joints' bounds.
-    pub motion: Vec<f64>,
-    /// Of every priority in turn, the root of the sum of the squared errors over their standard deviations: now, and as predicted.
-    pub errors: Vec<[f64; 2]>,
-    /// What holds the motion back.
-    pub active: Vec<Active>,
-    /// True where numbers were not finite or the program broke down. The motion is 0, or leads back inside the limits.
-    pub failed: bool,
-}
-
-/// A constraint that holds a motion back.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Active {
-    /// Which.
-    pub constraint: Constraint,
-    /// How much the cost of the priority that it holds back would fall per unit that it were wider.
-    pub multiplier: f64,
-    /// How far it gave way, in its own unit; 0 where it holds.
-    pub slack: f64,
-}
-
-/// Names a constraint.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Constraint {
-    /// A joint's own bound.
-    Joint {
-        /// Index of the joint.
-        joint: usize,
-        /// Which bound.
-        bound: Bound,
-        /// True where it may not move up, false where it may not move down.
-        upper: bool,
-    },
-    /// A row of a limit.
-    Limit {
-        /// Index of the limit in the list that was given.
-        limit: usize,
-        /// Its row.
-        row: usize,
-    },
-}
-
-/// Least damping, as a share of the largest diagonal entry of H.
-const LEAST: f64 = 1e-12;
-
-/// A direction whose rows are below this share of the largest is left open by a priority.
-const OPEN: f64 = 1e-6;
-
 impl Default for Stepper {
     /// With a damping of 1e-3.
     fn default() -> Self {
@@ -99,197 +39,55 @@ impl Default for Stepper {
 }
 
 impl Stepper {
-    /// `damping`: see [`Stepper::damping`]; 0 takes whole Gauss-Newton steps.
+    /// `damping`: see [`MotionSolver::damping`]; 0 takes whole Gauss-Newton steps.
     pub fn new(damping: f64) -> Self {
         Stepper {
-            damping,
+            solver: MotionSolver::new(damping),
             bounds: JointBounds::default(),
-            tasks: TaskRows::default(),
+            tasks: Vec::new(),
             limits: LimitRows::default(),
-            hessian: Vec::new(),
-            gradient: Vec::new(),
-            program: QuadraticProgram::new(0, 0),
-            lower: Vec::new(),
-            step: Step::default(),
         }
     }
 
     /// The motion of the next `dt` seconds that leads best towards the goals.
     ///
-    /// It always is finite and inside the joints' bounds; from outside their range it leads back or stands still. Limits give way where
-    /// they cannot hold, the weakest first, and [`Step::active`] says which and how far. Where nothing holds it back, it is the damped
-    /// Gauss-Newton step, exactly.
+    /// It always is finite and inside the joints' bounds; from outside their range it leads back or stands still. See
+    /// [`MotionSolver::solve`].
     pub fn step(&mut self, arm: &Arm, at: &Configuration, goals: &[Goal<'_>], limits: &[&dyn Limit], dt: f64) -> &Step {
         let n = arm.joints();
-        self.step.motion.clear();
-        self.step.motion.resize(n, 0.0);
-        self.step.errors.clear();
-        self.step.active.clear();
-        self.step.failed = !is_usable(at, n, dt);
-        if self.step.failed {
-            return &self.step;
+        if !is_usable(at, n, dt) {
+            return self.solver.refuse(n);
         }
-        self.bounds.update(arm, at, dt);
+        self.bounds.update(arm.limits(), &at.joints, &at.velocity, dt);
         self.limits.clear(n);
         for (index, limit) in limits.iter().enumerate() {
+            self.limits.begin(index);
             limit.rows(arm, at, dt, &mut self.limits);
-            self.limits.name(index);
         }
-        let mut open: Option<DMatrix<f64>> = None;
-        let mut priority = goals.iter().map(|goal| goal.priority).min().unwrap_or(0);
-        loop {
-            self.tasks.clear(n);
+        let priorities = self.gather(arm, at, goals);
+        self.solver.solve(&self.tasks[..priorities], &self.limits, &self.bounds)
+    }
+
+    /// Rows of every priority in turn; the number of priorities.
+    fn gather(&mut self, arm: &Arm, at: &Configuration, goals: &[Goal<'_>]) -> usize {
+        let mut priorities = 0;
+        let mut next = goals.iter().map(|goal| goal.priority).min();
+        while let Some(priority) = next {
+            if priorities == self.tasks.len() {
+                self.tasks.push(TaskRows::default());
+            }
+            let tasks = &mut self.tasks[priorities];
+            tasks.clear(arm.joints());
             for goal in goals.iter().filter(|goal| goal.priority == priority) {
-                let first = self.tasks.len();
-                goal.task.rows(arm, at, &mut self.tasks);
-                self.tasks.share(first, goal.share);
+                let first = tasks.len();
+                goal.task.rows(arm, at, tasks);
+                tasks.share(first, goal.share);
             }
-            let before = self.tasks.errors();
-            match &open {
-                None => self.first(n),
-                Some(basis) => self.further(n, basis),
-            }
-            self.step.errors.push([before.sqrt(), self.tasks.cost(&self.step.motion).sqrt()]);
-            let Some(next) = goals.iter().map(|goal| goal.priority).filter(|other| *other > priority).min() else {
-                break;
-            };
-            open = Some(self.left_open(n, open));
-            if self.step.failed || open.as_ref().is_some_and(|basis| basis.ncols() == 0) {
-                break;
-            }
-            priority = next;
+            priorities += 1;
+            next = goals.iter().map(|goal| goal.priority).filter(|other| *other > priority).min();
         }
-        &self.step
+        priorities
     }
-
-    /// Of the highest priority: over the joints, in their box.
-    fn first(&mut self, n: usize) {
-        self.normal_equations(n);
-        let m = self.limits.len();
-        if self.program.shape() != (n, m) {
-            self.program = QuadraticProgram::new(n, m);
-        }
-        let found = self.program.solve(&Qp {
-            hessian: &self.hessian,
-            gradient: &self.gradient,
-            lower: &self.bounds.lower,
-            upper: &self.bounds.upper,
-            rows: &self.limits.rows,
-            bounds: &self.limits.bounds,
-            strengths: &self.limits.strengths,
-        });
-        self.step.motion.copy_from_slice(&found.x);
-        self.step.failed = found.end == QpEnd::Failed;
-        for (joint, &multiplier) in found.of_box.iter().enumerate().filter(|(_, multiplier)| **multiplier != 0.0) {
-            self.step.active.push(joint_held(&self.bounds, joint, multiplier, multiplier > 0.0));
-        }
-        for (i, &(limit, row)) in self.limits.of.iter().enumerate() {
-            let (multiplier, slack) = (found.of_rows[i], found.slack[i]);
-            if multiplier > 0.0 || slack > 0.0 {
-                self.step.active.push(Active { constraint: Constraint::Limit { limit, row }, multiplier, slack });
-            }
-        }
-    }
-
-    /// Of a lower priority: the motion so far plus B z, with the box as rows.
-    fn further(&mut self, n: usize, basis: &DMatrix<f64>) {
-        self.normal_equations(n);
-        let (hessian, k) = (DMatrix::from_row_slice(n, n, &self.hessian), basis.ncols());
-        let so_far = DVector::from_column_slice(&self.step.motion);
-        let gradient = DVector::from_column_slice(&self.gradient) + &hessian * &so_far;
-        let m = self.limits.len();
-        let mut all = DMatrix::zeros(2 * n + m, n);
-        let mut room = DVector::zeros(2 * n + m);
-        for i in 0..n {
-            (all[(i, i)], all[(n + i, i)]) = (1.0, -1.0);
-            room[i] = self.bounds.upper[i] - so_far[i];
-            room[n + i] = so_far[i] - self.bounds.lower[i];
-        }
-        for i in 0..m {
-            let row = &self.limits.rows[i * n..(i + 1) * n];
-            all.row_mut(2 * n + i).copy_from_slice(row);
-            let used: f64 = row.iter().zip(so_far.iter()).map(|(slope, step)| slope * step).sum();
-            room[2 * n + i] = self.limits.bounds[i] - used;
-        }
-        // What the higher priorities could not hold stays as it is.
-        room.iter_mut().for_each(|room| *room = room.max(0.0));
-        let (reduced, slope) = (basis.transpose() * &hessian * basis, basis.transpose() * gradient);
-        let rows: Vec<f64> = (&all * basis).transpose().as_slice().to_vec();
-        let shape = (k, 2 * n + m);
-        let place = self.lower.iter().position(|program| program.shape() == shape).unwrap_or_else(|| {
-            self.lower.push(QuadraticProgram::new(shape.0, shape.1));
-            self.lower.len() - 1
-        });
-        let found = self.lower[place].solve(&Qp {
-            hessian: reduced.as_slice(),
-            gradient: slope.as_slice(),
-            lower: &vec![f64::NEG_INFINITY; k],
-            upper: &vec![f64::INFINITY; k],
-            rows: &rows,
-            bounds: room.as_slice(),
-            strengths: &vec![100.0; shape.1],
-        });
-        self.step.failed |= found.end == QpEnd::Failed;
-        let motion = so_far + basis * DVector::from_column_slice(&found.x);
-        for (i, motion) in motion.iter().enumerate() {
-            self.step.motion[i] = motion.min(self.bounds.upper[i]).max(self.bounds.lower[i]);
-        }
-        for (i, &multiplier) in found.of_rows.iter().enumerate().filter(|(_, multiplier)| **multiplier > 0.0) {
-            let active = if i < 2 * n {
-                joint_held(&self.bounds, i % n, if i < n { multiplier } else { -multiplier }, i < n)
-            } else {
-                let (limit, row) = self.limits.of[i - 2 * n];
-                Active { constraint: Constraint::Limit { limit, row }, multiplier, slack: 0.0 }
-            };
-            self.step.active.push(active);
-        }
-    }
-
-    /// H = Jᵀ J + δ I and g = -Jᵀ e of the tasks' rows.
-    fn normal_equations(&mut self, n: usize) {
-        self.hessian.clear();
-        self.hessian.resize(n * n, 0.0);
-        self.gradient.clear();
-        self.gradient.resize(n, 0.0);
-        let mut squares = 0.0;
-        for index in 0..self.tasks.len() {
-            let ((row, error), wanted) = (self.tasks.row(index), self.tasks.wanted(index));
-            squares += error * error;
-            for i in 0..n {
-                self.gradient[i] -= row[i] * wanted;
-                let columns = &mut self.hessian[i * n..i * n + i + 1];
-                columns.iter_mut().zip(row).for_each(|(entry, slope)| *entry += row[i] * slope);
-            }
-        }
-        let largest = (0..n).map(|i| self.hessian[i * n + i]).fold(0.0, f64::max);
-        let damping = self.damping * squares / self.tasks.len().max(1) as f64 + LEAST * largest;
-        for i in 0..n {
-            self.hessian[i * n + i] += damping.max(f64::MIN_POSITIVE.sqrt());
-            for j in 0..i {
-                self.hessian[j * n + i] = self.hessian[i * n + j];
-            }
-        }
-    }
-
-    /// An orthonormal basis of the motions that the priorities so far leave open.
-    fn left_open(&self, n: usize, before: Option<DMatrix<f64>>) -> DMatrix<f64> {
-        let before = before.unwrap_or_else(|| DMatrix::identity(n, n));
-        let k = before.ncols();
-        let mut square = DMatrix::zeros(n, n);
-        for index in 0..self.tasks.len() {
-            let row = DVector::from_column_slice(self.tasks.row(index).0);
-            square.ger(1.0, &row, &row, 1.0);
-        }
-        let eigen = (before.transpose() * square * &before).symmetric_eigen();
-        let largest = eigen.eigenvalues.iter().fold(0.0, |most: f64, value| most.max(*value));
-        let open: Vec<usize> = (0..k).filter(|i| eigen.eigenvalues[*i] <= OPEN * OPEN * largest).collect();
-        before * eigen.eigenvectors.select_columns(&open)
-    }
-}
-
-fn joint_held(bounds: &JointBounds, joint: usize, multiplier: f64, upper: bool) -> Active {
-    let bound = if upper { bounds.of_upper[joint] } else { bounds.of_lower[joint] };
-    Active { constraint: Constraint::Joint { joint, bound, upper }, multiplier: multiplier.abs(), slack: 0.0 }
 }
 
 /// A configuration of `n` finite joints.

@@ -25,5 +25,6 @@ mod simulate;
 mod states;
 mod targets;
 mod tidy;
+mod uncalibrated;
 mod weak;
 mod wrong_data;
