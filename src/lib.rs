@@ -12,8 +12,10 @@ pub mod infer;
 pub mod online;
 pub mod recording;
 pub mod rig;
+pub mod scene;
 pub mod servo;
 pub mod simulate;
+mod svg;
 
 pub use error::Error;
 pub use handeye_solvers as solvers;

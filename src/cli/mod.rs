@@ -13,6 +13,7 @@ mod inputs;
 mod monitor;
 mod noise;
 mod progress;
+mod servo;
 mod simulate;
 mod survey;
 mod table;
@@ -33,6 +34,7 @@ Examples:
   handeye calibrate motions.jsonl --rig arm.toml -o learned.toml   from what is known of the rig
   handeye evaluate learned.toml fresh.jsonl                        judge it on other samples
   handeye infer learned.toml fresh.jsonl                           joints and poses from pixels alone
+  handeye servo learned.toml ur5-reach                             move features to pixels, in simulation
 
 Exit status: 0 done; 1 the work could not be done, with the reason; 2 unusable input or arguments.";
 
@@ -59,6 +61,7 @@ enum Command {
     Evaluate(evaluate::Evaluate),
     Infer(infer::Infer),
     Monitor(monitor::MonitorCommand),
+    Servo(servo::Servo),
     Experiment(experiment::ExperimentCommand),
     Completions(completions::Completions),
 }
@@ -81,6 +84,7 @@ impl Cli {
             Command::Evaluate(evaluate) => evaluate.run(),
             Command::Infer(infer) => infer.run(),
             Command::Monitor(monitor) => monitor.run(),
+            Command::Servo(servo) => servo.run(self.json),
             Command::Experiment(experiment) => experiment.run(),
             Command::Completions(completions) => completions.run(),
         }

@@ -31,3 +31,26 @@ impl Drop for Bar {
         self.0.finish_and_clear();
     }
 }
+
+/// A line that is rewritten as things go on, or nothing: as above.
+pub struct Line(ProgressBar);
+
+impl Line {
+    pub fn new(is_json: bool) -> Self {
+        let target = if is_json { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+        let line = ProgressBar::with_draw_target(None, target);
+        line.set_style(ProgressStyle::with_template("{msg}").unwrap_or_else(|_| ProgressStyle::default_spinner()));
+        Line(line)
+    }
+
+    pub fn show(&self, words: &str) {
+        self.0.set_message(words.to_owned());
+        self.0.tick();
+    }
+}
+
+impl Drop for Line {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}

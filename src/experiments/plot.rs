@@ -1,6 +1,6 @@
 //! The curves of an experiment as an SVG drawing: ours in the median with what lies between 10 and 90 %, published ones dashed.
 use super::{Outcome, Row};
-use std::fmt::Write;
+use crate::svg::{Svg, points};
 
 const WIDTH: f64 = 720.0;
 const HEIGHT: f64 = 440.0;
@@ -12,18 +12,10 @@ const COLOURS: [&str; 4] = ["#1f77b4", "#d62728", "#2ca02c", "#9467bd"];
 pub fn svg(title: &str, outcome: &Outcome) -> Option<String> {
     let rows: Vec<&Row> = outcome.rows.iter().filter(|row| row.x.is_some() && !row.values.is_empty()).collect();
     let axes = Axes::new(&rows)?;
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" font-family=\"sans-serif\" \
-         font-size=\"13\">\n<rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"white\"/>\n"
-    );
-    text(&mut svg, [WIDTH / 2.0, 20.0], "middle", title);
-    text(&mut svg, [WIDTH / 2.0, HEIGHT - 12.0], "middle", outcome.abscissa.unwrap_or_default());
-    let _ = writeln!(
-        svg,
-        "<text transform=\"translate(16 {}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
-        HEIGHT / 2.0,
-        escaped(outcome.measure)
-    );
+    let mut svg = Svg::new(WIDTH, HEIGHT);
+    svg.text([WIDTH / 2.0, 20.0], "middle", title);
+    svg.text([WIDTH / 2.0, HEIGHT - 12.0], "middle", outcome.abscissa.unwrap_or_default());
+    svg.upwards([16.0, HEIGHT / 2.0], outcome.measure);
     axes.draw(&mut svg);
     let mut series: Vec<&str> = rows.iter().map(|row| row.series).collect();
     series.dedup();
@@ -33,18 +25,17 @@ pub fn svg(title: &str, outcome: &Outcome) -> Option<String> {
         curve(&mut svg, &axes, &own, colour);
         let y = MARGIN[2] + 16.0 * (index as f64 + 1.0);
         let label = if name.is_empty() { "ours" } else { name };
-        let _ = writeln!(svg, "<circle cx=\"{}\" cy=\"{}\" r=\"4\" fill=\"{colour}\"/>", WIDTH - 180.0, y - 4.0);
-        text(&mut svg, [WIDTH - 170.0, y], "start", label);
+        svg.element(format_args!("circle cx=\"{}\" cy=\"{}\" r=\"4\" fill=\"{colour}\"", WIDTH - 180.0, y - 4.0));
+        svg.text([WIDTH - 170.0, y], "start", label);
     }
     if rows.iter().any(|row| row.published.is_some()) {
-        text(&mut svg, [WIDTH - 184.0, MARGIN[2] + 16.0 * (series.len() as f64 + 1.0)], "start", "- - published");
+        svg.text([WIDTH - 184.0, MARGIN[2] + 16.0 * (series.len() as f64 + 1.0)], "start", "- - published");
     }
-    svg += "</svg>\n";
-    Some(svg)
+    Some(svg.finish())
 }
 
 /// Ours: the band, the line where every point is of several trials, and the points. Published: a dashed line.
-fn curve(svg: &mut String, axes: &Axes, rows: &[&Row], colour: &str) {
+fn curve(svg: &mut Svg, axes: &Axes, rows: &[&Row], colour: &str) {
     let at = |row: &Row, y: f64| axes.place(row.x.unwrap_or_default(), y);
     let share = |row: &Row, share: f64| {
         let mut sorted = row.values.clone();
@@ -56,18 +47,15 @@ fn curve(svg: &mut String, axes: &Axes, rows: &[&Row], colour: &str) {
         let upper = rows.iter().map(|row| at(row, share(row, 0.9)));
         let lower = rows.iter().rev().map(|row| at(row, share(row, 0.1)));
         let band = points(upper.chain(lower));
-        let _ = writeln!(svg, "<polygon points=\"{band}\" fill=\"{colour}\" fill-opacity=\"0.15\"/>");
-        let line = points(medians.iter().copied());
-        let _ = writeln!(svg, "<polyline points=\"{line}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>");
+        svg.element(format_args!("polygon points=\"{band}\" fill=\"{colour}\" fill-opacity=\"0.15\""));
+        svg.line(medians.iter().copied(), &format!("stroke=\"{colour}\" stroke-width=\"2\""));
     }
     for [x, y] in medians {
-        let _ = writeln!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3.5\" fill=\"{colour}\"/>");
+        svg.element(format_args!("circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3.5\" fill=\"{colour}\""));
     }
-    let published = rows.iter().filter_map(|row| Some(at(row, row.published?.mean)));
-    let line = points(published);
-    if !line.is_empty() {
-        let _ =
-            writeln!(svg, "<polyline points=\"{line}\" fill=\"none\" stroke=\"{colour}\" stroke-dasharray=\"6 5\"/>");
+    let published: Vec<[f64; 2]> = rows.iter().filter_map(|row| Some(at(row, row.published?.mean))).collect();
+    if !published.is_empty() {
+        svg.line(published, &format!("stroke=\"{colour}\" stroke-dasharray=\"6 5\""));
     }
 }
 
@@ -104,35 +92,19 @@ impl Axes {
     }
 
     /// A line per power of ten, five numbers along the abscissa.
-    fn draw(&self, svg: &mut String) {
+    fn draw(&self, svg: &mut Svg) {
         for power in self.y[0] as i32..=self.y[1] as i32 {
             let value = 10.0_f64.powi(power);
             let [left, y] = self.place(self.x[0], value);
-            let _ = writeln!(
-                svg,
-                "<line x1=\"{left:.1}\" y1=\"{y:.1}\" x2=\"{:.1}\" y2=\"{y:.1}\" stroke=\"#ddd\"/>",
-                WIDTH - MARGIN[1]
-            );
-            text(svg, [left - 6.0, y + 4.0], "end", &format!("{value}"));
+            svg.line([[left, y], [WIDTH - MARGIN[1], y]], "stroke=\"#ddd\"");
+            svg.text([left - 6.0, y + 4.0], "end", &format!("{value}"));
         }
         for tick in 0..5 {
             let value = self.x[0] + (self.x[1] - self.x[0]) * (0.03 / 1.06 + f64::from(tick) / 4.0 / 1.06);
             let [x, _] = self.place(value, 1.0);
             let span = self.x[1] - self.x[0];
             let digits = if span > 5.0 { 0 } else { (1.0 - span.log10()).ceil().max(0.0) as usize };
-            text(svg, [x, HEIGHT - MARGIN[3] + 18.0], "middle", &format!("{value:.digits$}"));
+            svg.text([x, HEIGHT - MARGIN[3] + 18.0], "middle", &format!("{value:.digits$}"));
         }
     }
-}
-
-fn points(places: impl Iterator<Item = [f64; 2]>) -> String {
-    places.map(|[x, y]| format!("{x:.1},{y:.1}")).collect::<Vec<_>>().join(" ")
-}
-
-fn text(svg: &mut String, [x, y]: [f64; 2], anchor: &str, words: &str) {
-    let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{}</text>", escaped(words));
-}
-
-fn escaped(words: &str) -> String {
-    words.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

@@ -62,7 +62,7 @@ impl Inference {
             views: Views::new(&model),
             limits: JointBox::new(rig),
             action_sd: rig.noise.joint_action,
-            sigma: if rig.noise.pixels > 0.0 { rig.noise.pixels } else { EXACT },
+            sigma: pixel_sd(rig),
             inverse: InverseKinematics::new(rig, inverse)?,
             error: PixelError::default(),
             trial: Vec::new(),
@@ -74,7 +74,7 @@ impl Inference {
     /// From features on the tip seen by cameras in the world, and features in the world seen by cameras on the tip. Points in a plane
     /// before one camera often have two poses.
     pub fn poses(&self, sightings: &[Sighting]) -> Vec<InferredPose> {
-        poses(&self.views, &self.known(sightings), self.chain.len(), self.sigma)
+        poses(&self.views, &self.views.known(sightings), self.chain.len(), self.sigma)
     }
 
     /// The joints' branches that explain the sightings, most probable first: never empty.
@@ -128,17 +128,9 @@ impl Inference {
             .ok_or_else(|| Error::NotEnoughData("the search from this start broke down".to_owned()))
     }
 
-    /// Those of the rig.
-    fn known(&self, sightings: &[Sighting]) -> Vec<Sighting> {
-        let mut known: Vec<Sighting> =
-            sightings.iter().filter(|sighting| self.views.knows(sighting)).copied().collect();
-        known.sort_by_key(|sighting| (sighting.camera, sighting.feature));
-        known
-    }
-
     /// Those that some joint moves.
     pub(super) fn moved(&self, sightings: &[Sighting]) -> Vec<Sighting> {
-        let mut seen = self.known(sightings);
+        let mut seen = self.views.known(sightings);
         seen.retain(|sighting| {
             let (from, to) = self.views.between(sighting);
             from < to
@@ -161,3 +153,8 @@ impl Inference {
 
 /// Stands in for a rig that says its pixels are exact [px].
 const EXACT: f64 = 1e-3;
+
+/// Standard deviation of a pixel coordinate [px].
+pub(super) fn pixel_sd(rig: &Rig) -> f64 {
+    if rig.noise.pixels > 0.0 { rig.noise.pixels } else { EXACT }
+}

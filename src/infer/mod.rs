@@ -14,6 +14,7 @@ mod prior;
 mod search;
 mod sighting;
 mod starts;
+mod tip;
 mod views;
 
 pub(crate) use views::Views;
@@ -25,3 +26,4 @@ pub use joints::{InferOptions, Inference};
 pub use pose::InferredPose;
 pub use prior::Prior;
 pub use sighting::{Names, Sighting};
+pub use tip::TipInference;

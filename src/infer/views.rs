@@ -47,7 +47,8 @@ impl Views {
         let depth = |parent: Parent| match parent {
             Parent::World => 0,
             Parent::Link(joint) => joint + 1,
-            Parent::Tip => model.chain.len(),
+            // A tip whose joints nobody knows moves all the same.
+            Parent::Tip => model.chain.len().max(1),
         };
         let view = |camera: &crate::rig::ModelCamera| View {
             model: camera.model,
@@ -64,6 +65,13 @@ impl Views {
         sighting.camera < self.cameras.len()
             && sighting.feature < self.features.len()
             && sighting.pixel.iter().all(|number| number.is_finite())
+    }
+
+    /// The sightings that are of the rig and finite, in order.
+    pub fn known(&self, sightings: &[Sighting]) -> Vec<Sighting> {
+        let mut known: Vec<Sighting> = sightings.iter().filter(|sighting| self.knows(sighting)).copied().collect();
+        known.sort_by_key(|sighting| (sighting.camera, sighting.feature));
+        known
     }
 
     /// Joints between a camera and a feature, which are those that move its pixel: from the first to before the second.

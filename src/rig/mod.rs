@@ -3,7 +3,7 @@ pub mod catalog;
 mod model;
 mod names;
 mod paths;
-mod read;
+pub(crate) mod read;
 mod replace;
 pub(crate) mod rotations;
 mod types;

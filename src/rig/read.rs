@@ -1,9 +1,9 @@
 //! Reading rig files: every mistake is reported with its line and column, what was found, and what would do.
-mod document;
+pub(crate) mod document;
 mod estimate;
 mod fit;
 mod named;
-mod noise;
+pub(crate) mod noise;
 mod pose;
 mod robot;
 mod views;
@@ -12,7 +12,6 @@ use super::Rig;
 use crate::Error;
 use document::{Node, Source};
 use std::path::Path;
-use toml_edit::Document;
 pub(crate) use views::problem_of_distortion;
 
 impl Rig {
@@ -26,10 +25,7 @@ impl Rig {
     /// Reads the text of a rig file, which messages call `file_name`.
     pub fn parse(text: &str, file_name: &str) -> Result<Rig, Error> {
         let source = Source { file: file_name, text };
-        let document = Document::parse(text).map_err(|error| {
-            let offset = error.span().map_or(text.len(), |span| span.start);
-            Error::at(file_name, text, offset, error.message().to_owned())
-        })?;
+        let document = document::parse(&source)?;
         let root = Node::root(&source, document.as_table());
         let fields = root.table(&["name", "robot", "cameras", "features", "targets", "noise", "estimate", "fit"])?;
         let node = |key: &str| fields.field(key).map(|field| field.value);
@@ -54,7 +50,7 @@ impl Rig {
 }
 
 /// The text of a file, which has to be UTF-8.
-pub(super) fn read_text(path: &Path) -> Result<String, Error> {
+pub(crate) fn read_text(path: &Path) -> Result<String, Error> {
     let bytes = std::fs::read(path).map_err(|source| Error::io(path, source))?;
     String::from_utf8(bytes).map_err(|error| {
         let valid = error.utf8_error().valid_up_to();

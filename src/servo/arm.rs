@@ -65,6 +65,11 @@ impl Arm {
         self.chain.len()
     }
 
+    /// `world_from_tip` at these joints, one reading each [rad or m].
+    pub fn tip(&self, joints: &[f64]) -> Pose {
+        self.chain.tip(joints)
+    }
+
     /// Limits of every joint, as the rig has them.
     pub fn limits(&self) -> &[Limits] {
         &self.limits

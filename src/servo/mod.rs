@@ -5,19 +5,30 @@
 //! must not happen. A [`Stepper`] gathers their rows from a rig, and a [`MotionSolver`] finds the motion from rows, wherever they come
 //! from. Everything is kept between steps: a loop with goals of one priority allocates nothing of its own after its first step.
 mod arm;
+mod controller;
 mod joint_bounds;
 pub mod limits;
 mod model_based;
+mod model_based_tip;
 mod motion_solver;
 mod rows;
+mod servo_loop;
 mod step;
+mod stop;
+mod takes;
 pub mod tasks;
 
+pub use crate::simulate::world::Command;
 pub use arm::{Arm, Configuration, Sight};
+pub use controller::{Controller, Decision, Measurement};
 pub use joint_bounds::{Bound, JointBounds};
 pub use limits::Limit;
 pub use model_based::ModelBased;
+pub use model_based_tip::ModelBasedTip;
 pub use motion_solver::{Active, Constraint, MotionSolver, Step};
 pub use rows::{LimitRows, TaskRows};
+pub use servo_loop::{LoopSettings, ServoLoop, Tick};
 pub use step::{Goal, Stepper};
+pub use stop::Stop;
+pub use takes::Takes;
 pub use tasks::Task;

@@ -1,6 +1,8 @@
 //! The paper's controller: infer the present and the target joints, command the difference, repeat.
-use super::tasks::JointTarget;
-use super::{Arm, Configuration, Goal, Limit, Step, Stepper};
+use super::tasks::{ImagePoints, JointTarget};
+use super::{
+    Active, Arm, Bound, Configuration, Constraint, Controller, Decision, Goal, Limit, Measurement, Step, Stepper, Takes,
+};
 use crate::Error;
 use crate::infer::{Branch, InferOptions, Inference, Prior, Sighting};
 use crate::rig::Rig;
@@ -10,6 +12,8 @@ use crate::rig::Rig;
 /// Where the joints are is inferred from what is seen now, and where they shall be from what shall be seen; both are of one rig, so
 /// what it is off by mostly cancels. The command is their difference, made to obey limits by a [`Stepper`].
 pub struct ModelBased {
+    /// What the robot takes.
+    pub takes: Takes,
     arm: Arm,
     inference: Inference,
     stepper: Stepper,
@@ -18,10 +22,17 @@ pub struct ModelBased {
     goal: Vec<Sighting>,
     /// Standard deviation of a pixel coordinate [px].
     sigma: f64,
+    /// Where the last command should have led [rad or m]; empty before the first.
+    expected: Vec<f64>,
+    /// What keeps the target from the pixels that are aimed at.
+    held: Vec<Active>,
 }
 
 /// A branch does not explain the pixels where they are e to this power less likely than by the best.
 const UNLIKELY: f64 = 3.0;
+
+/// A target whose pixels differ from those aimed at by more standard deviations is out of reach.
+const REACHED: f64 = 5.0;
 
 /// Branches whose pixels differ from the target's by less than this more than the best are as near [px].
 const AS_NEAR: f64 = 1e-3;
@@ -32,6 +43,7 @@ impl ModelBased {
     /// Errors: [`Error::Unusable`] with the paths of what is missing, or where there is no joint.
     pub fn new(rig: &Rig) -> Result<Self, Error> {
         Ok(ModelBased {
+            takes: Takes::default(),
             arm: Arm::new(rig)?,
             inference: Inference::new(rig, InferOptions::default())?,
             stepper: Stepper::new(0.0),
@@ -39,6 +51,8 @@ impl ModelBased {
             target: JointTarget { joints: Vec::new(), sd: 1.0 },
             goal: Vec::new(),
             sigma: rig.noise.pixels.max(AS_NEAR),
+            expected: Vec::new(),
+            held: Vec::new(),
         })
     }
 
@@ -58,9 +72,15 @@ impl ModelBased {
         let now = self.nearest(seen, near)?;
         if self.target.joints.is_empty() {
             let goal = std::mem::take(&mut self.goal);
-            let found = self.best(&goal, &now.joints);
+            let found = match self.best(&goal, &now.joints) {
+                // Out of reach: as near as the limits allow from here.
+                Err(Error::NotEnoughData(_)) => self.inference.joints_near(&goal, &Prior::start(&now.joints)),
+                found => found,
+            };
             self.goal = goal;
-            self.target.joints = found?.joints;
+            let found = found?;
+            self.held = self.out_of_reach(&found);
+            self.target.joints = found.joints;
         }
         self.arm.configure(&now.joints, &mut self.at);
         let goals = [Goal::new(&self.target)];
@@ -79,6 +99,19 @@ impl ModelBased {
     /// Joints aimed at [rad or m]; empty before the first step towards them.
     pub fn target(&self) -> &[f64] {
         &self.target.joints
+    }
+
+    /// The ends of joints that keep a target from the pixels aimed at; none where it comes as near as pixels are told.
+    fn out_of_reach(&mut self, target: &Branch) -> Vec<Active> {
+        if target.rms_px < REACHED * self.sigma {
+            return Vec::new();
+        }
+        let mut at = Configuration::default();
+        self.arm.configure(&target.joints, &mut at);
+        let task = ImagePoints { targets: self.goal.clone(), seen: Vec::new(), sd: self.sigma };
+        let mut active = self.stepper.step(&self.arm, &at, &[Goal::new(&task)], &[], 1.0).active.clone();
+        active.retain(|active| matches!(active.constraint, Constraint::Joint { bound: Bound::Position, .. }));
+        active
     }
 
     /// Of the branches that may explain the pixels, the one nearest to some joints.
@@ -104,6 +137,24 @@ impl ModelBased {
         let least = all.iter().map(misfit).fold(f64::INFINITY, f64::min);
         all.retain(|branch| misfit(branch) <= least + UNLIKELY);
         Ok(all)
+    }
+}
+
+impl Controller for ModelBased {
+    fn aim(&mut self, goal: &[Sighting]) {
+        ModelBased::aim(self, goal);
+    }
+
+    /// Where there are no readings, the joints are expected where the last command should have led; before the first, the most probable
+    /// branch is taken.
+    fn decide(&mut self, now: &Measurement<'_>, limits: &[&dyn Limit], dt: f64) -> Result<Decision, Error> {
+        let near = if now.joints.is_empty() { self.expected.clone() } else { now.joints.to_vec() };
+        let step = self.step(now.seen, &near, limits, dt)?.clone();
+        self.expected.clear();
+        self.expected.extend(self.at.joints.iter().zip(&step.motion).map(|(joint, motion)| joint + motion));
+        let mut decision = Decision::new(self.takes, &self.arm, &self.at, &step, dt);
+        decision.active.extend_from_slice(&self.held);
+        Ok(decision)
     }
 }
 

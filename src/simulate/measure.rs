@@ -52,17 +52,20 @@ fn blur(sample: &mut Sample, noise: &Noise, random: &mut ChaCha8Rng) {
     let mut normal = |sd: f64| -> f64 { sd * random.sample::<f64, _>(StandardNormal) };
     sample.joints.iter_mut().flatten().for_each(|joint| *joint += normal(noise.joints));
     sample.joint_action.iter_mut().flatten().for_each(|joint| *joint += normal(noise.joint_action));
-    let mut moved = |pose: Pose, noise: PoseNoise| {
-        let w = Vector3::from_fn(|_, _| normal(noise.rot));
-        let v = Vector3::from_fn(|_, _| normal(noise.xyz));
-        Pose { rotation: so3::exp(&w) * pose.rotation, translation: pose.translation + v }
-    };
-    sample.pose = sample.pose.filter(|_| noise.pose.is_noisy()).map(|pose| moved(pose, noise.pose));
+    let pose = sample.pose.filter(|_| noise.pose.is_noisy());
+    sample.pose = pose.map(|pose| moved(pose, noise.pose, || normal(1.0)));
     // On A itself: the residual of eq. 12 of the paper, P_next P⁻¹ against A, is white.
-    sample.pose_action = sample.pose_action.map(|action| moved(action, noise.pose_action));
+    sample.pose_action = sample.pose_action.map(|action| moved(action, noise.pose_action, || normal(1.0)));
     for detection in &mut sample.pixels {
         detection.pixel = detection.pixel.map(|coordinate| coordinate + normal(noise.pixels));
     }
+}
+
+/// A pose turned and shifted by noise along the axes of its parent. `normal` draws standard normal numbers.
+pub(super) fn moved(pose: Pose, noise: PoseNoise, mut normal: impl FnMut() -> f64) -> Pose {
+    let w = Vector3::from_fn(|_, _| noise.rot * normal());
+    let v = Vector3::from_fn(|_, _| noise.xyz * normal());
+    Pose { rotation: so3::exp(&w) * pose.rotation, translation: pose.translation + v }
 }
 
 enum Fate {

@@ -3,6 +3,7 @@ mod measure;
 mod motions;
 mod random_rig;
 mod views;
+pub mod world;
 
 pub use random_rig::random_rig;
 

@@ -2,8 +2,9 @@
 use super::SimulateOptions;
 use crate::Error;
 use crate::recording::Detection;
-use crate::rig::{Model, Rig};
+use crate::rig::{Camera, Model, ModelCamera, Rig};
 use handeye_solvers::Pose;
+use nalgebra::Vector3;
 
 /// Cosine of the largest angle by which a pixel's own direction may differ from the feature's: where a distortion has
 /// folded back, a feature outside the image seems to be inside, and the two differ by far more.
@@ -35,17 +36,10 @@ impl<'a> Views<'a> {
                 return Err(Error::Unusable(format!("the rig has no {what}, so nothing would be seen")));
             }
         }
-        let size = |camera: &crate::rig::Camera| match camera.size {
-            Some(size) => Ok(size.map(f64::from)),
-            None => Err(Error::Unusable(format!(
-                "the rig is not complete: it has no value for `size` of camera `{}`",
-                camera.name
-            ))),
-        };
         let n_features = rig.features.len();
         Ok(Views {
             model,
-            sizes: rig.cameras.iter().map(size).collect::<Result<_, _>>()?,
+            sizes: sizes(rig)?,
             per_camera: (options.in_view * n_features as f64).ceil() as usize,
             in_total: options.min_features.min(n_features * rig.cameras.len()),
         })
@@ -89,15 +83,32 @@ impl<'a> Views<'a> {
     /// Where a camera sees a feature, if it does.
     fn pixel(&self, camera: usize, feature: usize, links: &[Pose]) -> Option<[f64; 2]> {
         let point = self.model.in_camera(camera, feature, links);
-        let [width, height] = self.sizes[camera];
-        let camera = &self.model.cameras[camera];
-        let [u, v] = camera.model.project(&camera.intrinsics, &point);
-        // The centre of the first pixel is 0, so the image begins half a pixel before it.
-        let is_inside = (-0.5..width - 0.5).contains(&u) && (-0.5..height - 0.5).contains(&v);
-        if !is_inside || !camera.model.is_in_front(&point) {
-            return None;
-        }
-        let ray = camera.model.unproject(&camera.intrinsics, [u, v])?;
-        (ray.dot(&point) >= SAME_DIRECTION * point.norm()).then_some([u, v])
+        pixel_inside(&self.model.cameras[camera], self.sizes[camera], &point)
     }
+}
+
+/// Where a camera with images of this size sees a point of its frame, if it does.
+pub(super) fn pixel_inside(camera: &ModelCamera, [width, height]: [f64; 2], point: &Vector3<f64>) -> Option<[f64; 2]> {
+    let [u, v] = camera.model.project(&camera.intrinsics, point);
+    // The centre of the first pixel is 0, so the image begins half a pixel before it.
+    let is_inside = (-0.5..width - 0.5).contains(&u) && (-0.5..height - 0.5).contains(&v);
+    if !is_inside || !camera.model.is_in_front(point) {
+        return None;
+    }
+    let ray = camera.model.unproject(&camera.intrinsics, [u, v])?;
+    (ray.dot(point) >= SAME_DIRECTION * point.norm()).then_some([u, v])
+}
+
+/// Width and height of every camera's images [px].
+///
+/// Errors: [`Error::Unusable`] where one is not known.
+pub(super) fn sizes(rig: &Rig) -> Result<Vec<[f64; 2]>, Error> {
+    let size = |camera: &Camera| match camera.size {
+        Some(size) => Ok(size.map(f64::from)),
+        None => Err(Error::Unusable(format!(
+            "the rig is not complete: it has no value for `size` of camera `{}`",
+            camera.name
+        ))),
+    };
+    rig.cameras.iter().map(size).collect()
 }

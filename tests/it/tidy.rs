@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 /// Modules of `src/`, each of which may use those of the ranks before its own. `error` is everybody's.
 const ORDER: &[&[&str]] = &[
     &["error"],
-    &["geometry", "camera", "chain"],
+    &["geometry", "camera", "chain", "svg"],
     &["rig"],
     &["recording"],
     &["simulate"],
@@ -15,6 +15,7 @@ const ORDER: &[&[&str]] = &[
     &["online"],
     &["infer"],
     &["servo"],
+    &["scene"],
     &["experiments"],
     &["cli"],
 ];

@@ -1,27 +1,37 @@
 //! A TOML text with its places: every value knows where it stands, so that what is wrong with it can say where.
 use crate::Error;
 use crate::error::suggestion;
-use toml_edit::{ArrayOfTables, Item, TableLike, Value};
+use toml_edit::{ArrayOfTables, Document, Item, TableLike, Value};
 
 /// The text and what the user calls it.
-pub(super) struct Source<'a> {
-    pub(super) file: &'a str,
-    pub(super) text: &'a str,
+pub(crate) struct Source<'a> {
+    pub(crate) file: &'a str,
+    pub(crate) text: &'a str,
 }
 
 impl Source<'_> {
-    pub(super) fn line(&self, offset: usize) -> usize {
+    pub(crate) fn line(&self, offset: usize) -> usize {
         1 + self.text.bytes().take(offset).filter(|byte| *byte == b'\n').count()
     }
 }
 
+/// The document of a text.
+///
+/// Errors: [`Error::Malformed`] where it is not TOML.
+pub(crate) fn parse<'a>(source: &Source<'a>) -> Result<Document<&'a str>, Error> {
+    Document::parse(source.text).map_err(|error| {
+        let offset = error.span().map_or(source.text.len(), |span| span.start);
+        Error::at(source.file, source.text, offset, error.message().to_owned())
+    })
+}
+
 /// A value of the document and its place.
 #[derive(Clone)]
-pub(super) struct Node<'a> {
+pub(crate) struct Node<'a> {
     source: &'a Source<'a>,
     content: Content<'a>,
     /// Bytes before it.
-    pub(super) offset: usize,
+    pub(crate) offset: usize,
     /// What messages call it: "camera `left`: `fx`".
     label: String,
 }
@@ -35,7 +45,7 @@ enum Content<'a> {
 
 impl<'a> Node<'a> {
     /// The whole document.
-    pub(super) fn root(source: &'a Source<'a>, table: &'a toml_edit::Table) -> Self {
+    pub(crate) fn root(source: &'a Source<'a>, table: &'a toml_edit::Table) -> Self {
         Node { source, content: Content::Table(table), offset: 0, label: String::new() }
     }
 
@@ -53,7 +63,7 @@ impl<'a> Node<'a> {
     }
 
     /// What is wrong with it.
-    pub(super) fn error(&self, problem: impl std::fmt::Display) -> Error {
+    pub(crate) fn error(&self, problem: impl std::fmt::Display) -> Error {
         let separator = if self.label.is_empty() { "" } else { ": " };
         Error::at(self.source.file, self.source.text, self.offset, format!("{}{separator}{problem}", self.label))
     }
@@ -77,11 +87,11 @@ impl<'a> Node<'a> {
     }
 
     /// The line on which it stands.
-    pub(super) fn line(&self) -> usize {
+    pub(crate) fn line(&self) -> usize {
         self.source.line(self.offset)
     }
 
-    pub(super) fn number(&self) -> Result<f64, Error> {
+    pub(crate) fn number(&self) -> Result<f64, Error> {
         let number = match self.content {
             Content::Value(Value::Float(number)) => *number.value(),
             Content::Value(Value::Integer(number)) => *number.value() as f64,
@@ -94,32 +104,32 @@ impl<'a> Node<'a> {
         }
     }
 
-    pub(super) fn positive(&self) -> Result<f64, Error> {
+    pub(crate) fn positive(&self) -> Result<f64, Error> {
         let number = self.number()?;
         if number > 0.0 { Ok(number) } else { Err(self.error(format!("must be above 0, found {number}"))) }
     }
 
     /// A standard deviation that may be 0.
-    pub(super) fn not_negative(&self) -> Result<f64, Error> {
+    pub(crate) fn not_negative(&self) -> Result<f64, Error> {
         let number = self.number()?;
         if number >= 0.0 { Ok(number) } else { Err(self.error(format!("must be 0 or more, found {number}"))) }
     }
 
-    pub(super) fn whole<T: TryFrom<i64>>(&self) -> Result<T, Error> {
+    pub(crate) fn whole<T: TryFrom<i64>>(&self) -> Result<T, Error> {
         let Content::Value(Value::Integer(number)) = self.content else {
             return Err(self.unexpected("a whole number"));
         };
         T::try_from(*number.value()).map_err(|_| self.error(format!("{} is out of range", number.value())))
     }
 
-    pub(super) fn flag(&self) -> Result<bool, Error> {
+    pub(crate) fn flag(&self) -> Result<bool, Error> {
         match self.content {
             Content::Value(Value::Boolean(flag)) => Ok(*flag.value()),
             _ => Err(self.unexpected("true or false")),
         }
     }
 
-    pub(super) fn text(&self) -> Result<&'a str, Error> {
+    pub(crate) fn text(&self) -> Result<&'a str, Error> {
         match self.content {
             Content::Value(Value::String(text)) => Ok(text.value()),
             _ => Err(self.unexpected("a string")),
@@ -127,7 +137,7 @@ impl<'a> Node<'a> {
     }
 
     /// A string that is one of the known words.
-    pub(super) fn word<T: Copy>(&self, what: &str, known: &[T], name: impl Fn(T) -> &'static str) -> Result<T, Error> {
+    pub(crate) fn word<T: Copy>(&self, what: &str, known: &[T], name: impl Fn(T) -> &'static str) -> Result<T, Error> {
         let found = self.text()?;
         known.iter().copied().find(|value| name(*value) == found).ok_or_else(|| {
             let names: Vec<&str> = known.iter().map(|value| name(*value)).collect();
@@ -136,7 +146,7 @@ impl<'a> Node<'a> {
     }
 
     /// The entries of an array, or of an array of tables.
-    pub(super) fn list(&self) -> Result<Vec<Node<'a>>, Error> {
+    pub(crate) fn list(&self) -> Result<Vec<Node<'a>>, Error> {
         let entry = |content, span: Option<std::ops::Range<usize>>, index: usize| Node {
             source: self.source,
             content,
@@ -160,19 +170,19 @@ impl<'a> Node<'a> {
     }
 
     /// An array of exactly N numbers.
-    pub(super) fn numbers<const N: usize>(&self) -> Result<[f64; N], Error> {
+    pub(crate) fn numbers<const N: usize>(&self) -> Result<[f64; N], Error> {
         let numbers = self.any_numbers()?;
         <[f64; N]>::try_from(numbers)
             .map_err(|found| self.error(format!("expected {N} numbers, found {}", found.len())))
     }
 
     /// An array of any length.
-    pub(super) fn any_numbers(&self) -> Result<Vec<f64>, Error> {
+    pub(crate) fn any_numbers(&self) -> Result<Vec<f64>, Error> {
         self.list()?.iter().map(Node::number).collect()
     }
 
     /// A table, where all of its keys are known.
-    pub(super) fn table(self, known: &[&str]) -> Result<Fields<'a>, Error> {
+    pub(crate) fn table(self, known: &[&str]) -> Result<Fields<'a>, Error> {
         let fields = self.any_table()?;
         for field in fields.iter() {
             if !known.contains(&field.key) {
@@ -185,48 +195,48 @@ impl<'a> Node<'a> {
     }
 
     /// A table of any keys.
-    pub(super) fn any_table(self) -> Result<Fields<'a>, Error> {
+    pub(crate) fn any_table(self) -> Result<Fields<'a>, Error> {
         match self.content {
             Content::Table(table) => Ok(Fields { node: self, table }),
             _ => Err(self.unexpected("a table")),
         }
     }
 
-    pub(super) fn is_table(&self) -> bool {
+    pub(crate) fn is_table(&self) -> bool {
         matches!(self.content, Content::Table(_))
     }
 
-    pub(super) fn is_list(&self) -> bool {
+    pub(crate) fn is_list(&self) -> bool {
         matches!(self.content, Content::Value(Value::Array(_)) | Content::Tables(_))
     }
 }
 
 /// A table and its place.
-pub(super) struct Fields<'a> {
-    pub(super) node: Node<'a>,
+pub(crate) struct Fields<'a> {
+    pub(crate) node: Node<'a>,
     table: &'a dyn TableLike,
 }
 
 /// A key of a table, its place and its value.
-pub(super) struct Field<'a> {
-    pub(super) key: &'a str,
-    pub(super) key_offset: usize,
-    pub(super) value: Node<'a>,
+pub(crate) struct Field<'a> {
+    pub(crate) key: &'a str,
+    pub(crate) key_offset: usize,
+    pub(crate) value: Node<'a>,
 }
 
 impl<'a> Fields<'a> {
     /// Calls the table by another name in messages.
-    pub(super) fn labelled(mut self, label: impl Into<String>) -> Self {
+    pub(crate) fn labelled(mut self, label: impl Into<String>) -> Self {
         self.node.label = label.into();
         self
     }
 
-    pub(super) fn error(&self, problem: impl std::fmt::Display) -> Error {
+    pub(crate) fn error(&self, problem: impl std::fmt::Display) -> Error {
         self.node.error(problem)
     }
 
     /// The value of a key.
-    pub(super) fn field(&self, key: &str) -> Option<Field<'a>> {
+    pub(crate) fn field(&self, key: &str) -> Option<Field<'a>> {
         let (key, item) = self.table.get_key_value(key)?;
         let key_offset = key.span().map_or(self.node.offset, |span| span.start);
         let label = format!("{}: `{}`", self.node.label, key.get()).trim_start_matches(": ").to_owned();
@@ -235,12 +245,12 @@ impl<'a> Fields<'a> {
     }
 
     /// Every key, in the file's order.
-    pub(super) fn iter(&self) -> impl Iterator<Item = Field<'a>> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = Field<'a>> {
         self.table.iter().filter_map(|(key, _)| self.field(key))
     }
 
     /// What `read` makes of a key's value; `None` where it is left out.
-    pub(super) fn optional<T>(
+    pub(crate) fn optional<T>(
         &self,
         key: &str,
         read: impl FnOnce(&Node<'a>) -> Result<T, Error>,
@@ -248,7 +258,7 @@ impl<'a> Fields<'a> {
         self.field(key).map(|field| read(&field.value)).transpose()
     }
 
-    pub(super) fn number(&self, key: &str) -> Result<Option<f64>, Error> {
+    pub(crate) fn number(&self, key: &str) -> Result<Option<f64>, Error> {
         self.optional(key, Node::number)
     }
 }

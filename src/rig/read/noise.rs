@@ -28,7 +28,7 @@ fn read_target_noise(node: &Node) -> Result<PoseNoise, Error> {
     Ok(PoseNoise { xyz: sd("xyz")?, rot: sd("rot")? })
 }
 
-fn read_pose_noise(node: &Node) -> Result<PoseNoise, Error> {
+pub(crate) fn read_pose_noise(node: &Node) -> Result<PoseNoise, Error> {
     let fields = node.clone().table(&["xyz", "rot"])?;
     let default = PoseNoise::default();
     Ok(PoseNoise {

@@ -1,0 +1,216 @@
+//! Reading scene files, with a place for every mistake.
+use super::{Control, LimitKind, Scene, Target};
+use crate::Error;
+use crate::rig::read::document::{Fields, Node, Source, parse};
+use crate::rig::read::noise::read_pose_noise;
+use crate::rig::{Rig, catalog, read::read_text};
+use crate::servo::{LoopSettings, Takes};
+use crate::simulate::world::{Execution, Tracker, WorldOptions};
+use nalgebra::Vector3;
+use std::path::Path;
+
+impl Scene {
+    /// Reads a scene file.
+    ///
+    /// Errors: [`Error::Io`], and [`Error::Malformed`] for whatever is wrong inside or in the rig file that it names.
+    pub fn read(path: &Path) -> Result<Scene, Error> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Scene::parse(&read_text(path)?, &path.display().to_string(), folder)
+    }
+
+    /// Reads the text of a scene file, which messages call `file_name`; a rig file that it names stands in `folder`.
+    pub fn parse(text: &str, file_name: &str, folder: &Path) -> Result<Scene, Error> {
+        let source = Source { file: file_name, text };
+        let document = parse(&source)?;
+        let root = Node::root(&source, document.as_table()).table(&[
+            "name",
+            "rig",
+            "seed",
+            "dt",
+            "robot",
+            "tracker",
+            "target",
+            "controller",
+            "limits",
+            "loop",
+        ])?;
+        let section = |name: &str, known: &[&str]| -> Result<Option<Fields<'_>>, Error> {
+            root.field(name).map(|field| Ok(field.value.table(known)?.labelled(name))).transpose()
+        };
+        let rig = root.optional("rig", |node| read_rig(node, folder))?;
+        let robot = section("robot", &["start", "takes", "readings", "latency", "execution"])?
+            .ok_or_else(|| root.error("has no table `robot`, which says where the arm starts"))?;
+        let target = section("target", &["joints", "velocity", "until"])?
+            .ok_or_else(|| root.error("has no table `target`, which says where the features shall be seen"))?;
+        let (tracker, missed) = match section("tracker", &["kind", "sd", "missed"])? {
+            Some(fields) => read_tracker(&fields)?,
+            None => (Tracker::Exact, 0.0),
+        };
+        let takes =
+            robot.optional("takes", |node| node.word("kind of command", Takes::ALL, Takes::name))?.unwrap_or_default();
+        let default = WorldOptions::default();
+        let scene = Scene {
+            name: root.optional("name", |node| node.text().map(str::to_owned))?,
+            world: WorldOptions {
+                execution: robot.optional("execution", read_execution)?.unwrap_or_default(),
+                readings: robot.optional("readings", read_readings)?.unwrap_or(default.readings),
+                tracker,
+                missed,
+                latency: robot.optional("latency", Node::not_negative)?.unwrap_or(default.latency),
+                seed: root.optional("seed", Node::whole)?.unwrap_or(default.seed),
+            },
+            takes,
+            start: joints(&robot, "start", rig.as_ref())?,
+            target: Target {
+                joints: joints(&target, "joints", rig.as_ref())?,
+                velocity: target.optional("velocity", Node::any_numbers)?.unwrap_or_default(),
+                until: target.optional("until", Node::not_negative)?.unwrap_or(f64::INFINITY),
+            },
+            control: match section("controller", &["kind", "speed"])? {
+                Some(fields) => read_control(&fields)?,
+                None => Control::ModelBased,
+            },
+            limits: match root.field("limits") {
+                Some(field) => read_limits(field.value)?,
+                None => Vec::new(),
+            },
+            settings: match root.field("loop") {
+                Some(field) => read_settings(field.value)?,
+                None => LoopSettings::default(),
+            },
+            dt: root.optional("dt", Node::positive)?.unwrap_or(1.0),
+            rig,
+        };
+        Ok(scene)
+    }
+}
+
+/// A shipped rig, or a file beside the scene.
+fn read_rig(node: &Node, folder: &Path) -> Result<Rig, Error> {
+    let name = node.text()?;
+    if catalog::ALL.iter().any(|(known, _)| *known == name) {
+        return catalog::rig(name);
+    }
+    Rig::read(&folder.join(name)).map_err(|error| match error {
+        Error::Io { source, .. } => {
+            let known: Vec<&str> = catalog::ALL.iter().map(|(known, _)| *known).collect();
+            node.error(format!(
+                "`{name}` is no rig file beside the scene ({source}), nor a shipped rig ({})",
+                known.join(", ")
+            ))
+        }
+        error => error,
+    })
+}
+
+/// Joints that have to be given, as many as the rig has where the scene names one.
+fn joints(fields: &Fields, key: &str, rig: Option<&Rig>) -> Result<Vec<f64>, Error> {
+    let field =
+        fields.field(key).ok_or_else(|| fields.error(format!("has no `{key}` (one number per joint, rad or m)")))?;
+    let found = field.value.any_numbers()?;
+    match rig.map(|rig| rig.robot.joints.len()) {
+        Some(n) if n != found.len() => {
+            Err(field.value.error(format!("has {} numbers, the rig has {n} joints", found.len())))
+        }
+        _ => Ok(found),
+    }
+}
+
+/// A standard deviation, or `false` for a robot that gives no readings.
+fn read_readings(node: &Node) -> Result<Option<f64>, Error> {
+    match node.flag() {
+        Ok(false) => Ok(None),
+        Ok(true) => Ok(Some(0.0)),
+        Err(_) => node.not_negative().map(Some),
+    }
+}
+
+fn read_execution(node: &Node) -> Result<Execution, Error> {
+    let fields = node.clone().table(&["joints", "pose", "share", "gain"])?;
+    let default = Execution::default();
+    Ok(Execution {
+        joints: fields.optional("joints", Node::not_negative)?.unwrap_or(default.joints),
+        pose: fields.optional("pose", read_pose_noise)?.unwrap_or(default.pose),
+        share: fields.optional("share", Node::not_negative)?.unwrap_or(default.share),
+        gain: fields.optional("gain", Node::any_numbers)?.unwrap_or(default.gain),
+    })
+}
+
+fn read_tracker(fields: &Fields) -> Result<(Tracker, f64), Error> {
+    let sd = fields.optional("sd", Node::not_negative)?;
+    let kind = fields.optional("kind", |node| node.word("tracker", &["exact", "rounded", "gaussian"], |name| name))?;
+    let tracker = match (kind, sd) {
+        (Some("gaussian"), None) => return Err(fields.error("is gaussian and has no `sd` (px)")),
+        (Some("gaussian") | None, Some(sd)) => Tracker::Gaussian(sd),
+        (Some(kind), Some(_)) => return Err(fields.error(format!("is {kind}, and `sd` is for gaussian ones"))),
+        (Some("rounded"), None) => Tracker::Rounded,
+        _ => Tracker::Exact,
+    };
+    let missed = fields.optional("missed", |node| {
+        let share = node.number()?;
+        if (0.0..=1.0).contains(&share) {
+            Ok(share)
+        } else {
+            Err(node.error(format!("must be from 0 to 1, found {share}")))
+        }
+    })?;
+    Ok((tracker, missed.unwrap_or(0.0)))
+}
+
+fn read_control(fields: &Fields) -> Result<Control, Error> {
+    let kind =
+        fields.optional("kind", |node| node.word("controller", &["model-based", "model-based-tip"], |name| name))?;
+    let speed = fields.optional("speed", |node| node.numbers::<2>())?;
+    match (kind, speed) {
+        (Some("model-based-tip"), speed) => Ok(Control::ModelBasedTip { speed: speed.unwrap_or([f64::INFINITY; 2]) }),
+        (_, None) => Ok(Control::ModelBased),
+        (_, Some(_)) => Err(fields.error("`speed` ([m/s, rad/s]) is for model-based-tip; others take [limits]")),
+    }
+}
+
+fn read_limits(node: Node) -> Result<Vec<(String, LimitKind)>, Error> {
+    let fields = node.table(&["in_image", "pixel_speed", "tip_speed", "half_spaces"])?.labelled("limits");
+    let mut limits = Vec::new();
+    let mut add = |name: &str, kind: Option<LimitKind>| limits.extend(kind.map(|kind| (name.to_owned(), kind)));
+    add("in_image", fields.optional("in_image", Node::number)?.map(LimitKind::InImage));
+    add("pixel_speed", fields.optional("pixel_speed", Node::positive)?.map(LimitKind::PixelSpeed));
+    add("tip_speed", fields.optional("tip_speed", Node::positive)?.map(LimitKind::TipSpeed));
+    for entry in fields.optional("half_spaces", Node::list)?.unwrap_or_default() {
+        let plane = entry.table(&["name", "normal", "offset"])?;
+        let need = |key: &str| plane.field(key).ok_or_else(|| plane.error(format!("has no `{key}`")));
+        let normal = need("normal")?;
+        let direction = Vector3::from(normal.value.numbers::<3>()?);
+        let unit = direction.try_normalize(0.0).ok_or_else(|| normal.value.error("is of length 0"))?;
+        let name = need("name")?.value.text()?;
+        // The plane stays where it is when its normal is made of unit length.
+        add(name, Some(LimitKind::HalfSpace(unit, need("offset")?.value.number()? / direction.norm())));
+    }
+    Ok(limits)
+}
+
+fn read_settings(node: Node) -> Result<LoopSettings, Error> {
+    let fields = node.table(&[
+        "tolerance_px",
+        "settled",
+        "window",
+        "diverged",
+        "timeout",
+        "watchdog",
+        "patience",
+        "look_then_move",
+        "follow",
+    ])?;
+    let fields = fields.labelled("loop");
+    let default = LoopSettings::default();
+    Ok(LoopSettings {
+        tolerance_px: fields.optional("tolerance_px", Node::positive)?.unwrap_or(default.tolerance_px),
+        settled: fields.optional("settled", Node::whole)?.unwrap_or(default.settled),
+        window: fields.optional("window", Node::whole)?.unwrap_or(default.window),
+        diverged: fields.optional("diverged", Node::positive)?.unwrap_or(default.diverged),
+        timeout: fields.optional("timeout", Node::positive)?.unwrap_or(default.timeout),
+        watchdog: fields.optional("watchdog", Node::positive)?.unwrap_or(default.watchdog),
+        patience: fields.optional("patience", Node::positive)?.unwrap_or(default.patience),
+        look_then_move: fields.optional("look_then_move", Node::flag)?.unwrap_or(default.look_then_move),
+        follow: fields.optional("follow", Node::flag)?.unwrap_or(default.follow),
+    })
+}

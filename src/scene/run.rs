@@ -1,0 +1,178 @@
+//! Running a scene.
+use super::{Control, LimitKind, Scene};
+use crate::Error;
+use crate::infer::{Names, Sighting};
+use crate::recording::{Detection, Recording, Sample};
+use crate::rig::Rig;
+use crate::servo::limits::{HalfSpace, InImage, PixelSpeed, TipSpeed};
+use crate::servo::{
+    Active, Command, Controller, Limit, LoopSettings, Measurement, ModelBased, ModelBasedTip, ServoLoop, Stop, Takes,
+};
+use crate::simulate::world::World;
+use std::ops::ControlFlow;
+
+/// What happened in a scene.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// Every measurement in turn.
+    pub moments: Vec<Moment>,
+    /// Why the loop stopped.
+    pub stop: Stop,
+    /// How many commands moved the robot.
+    pub commands: usize,
+    /// What the limits are called, in the order in which [`Active`] counts them.
+    pub limits: Vec<String>,
+    /// Names and image sizes to which the detections of the moments refer.
+    pub header: Recording,
+}
+
+/// One measurement, and what followed from it.
+#[derive(Clone, Debug)]
+pub struct Moment {
+    /// Seconds since the beginning.
+    pub time: f64,
+    /// Mean pixel distance of the features from the goal as the loop sees it [px]; `None` where none is seen.
+    pub error_px: Option<f64>,
+    /// Mean distance in space of what moves (features on the arm, cameras on it) from where it shall be, in truth [m].
+    pub error_m: f64,
+    /// Where the joints truly are [rad or m].
+    pub joints: Vec<f64>,
+    /// What is seen.
+    pub pixels: Vec<Detection>,
+    /// What is aimed at.
+    pub goal: Vec<Detection>,
+    /// What holds the motion back.
+    pub active: Vec<Active>,
+    /// What the robot was told.
+    pub command: Command,
+    /// Why it waits, where it does.
+    pub waits: Option<String>,
+}
+
+/// Runs a scene with a controller that knows `known`; what `watch` says of every moment may break it off.
+///
+/// Errors: [`Error::Unusable`] where rig and scene do not fit; [`Error::Cancelled`]; those of the controller.
+pub fn run(known: &Rig, scene: &Scene, watch: &mut dyn FnMut(&Moment) -> ControlFlow<()>) -> Result<Run, Error> {
+    match &scene.control {
+        Control::ModelBased => {
+            let mut controller = ModelBased::new(known)?;
+            controller.takes = scene.takes;
+            run_with(controller, known, scene, watch)
+        }
+        Control::ModelBasedTip { speed } => {
+            let mut controller = ModelBasedTip::new(known)?;
+            (controller.takes, controller.speed) = (scene.takes, *speed);
+            if !matches!(scene.takes, Takes::PoseDelta | Takes::PoseVelocity) {
+                return Err(Error::Unusable(format!(
+                    "a controller that moves the tip needs a robot that takes pose-deltas or pose-velocities, this takes {}",
+                    scene.takes.name()
+                )));
+            }
+            run_with(controller, known, scene, watch)
+        }
+    }
+}
+
+fn run_with<C: Controller>(
+    controller: C,
+    known: &Rig,
+    scene: &Scene,
+    watch: &mut dyn FnMut(&Moment) -> ControlFlow<()>,
+) -> Result<Run, Error> {
+    let truth = scene.rig.as_ref().unwrap_or(known);
+    check(truth, scene)?;
+    let mut world = World::new(truth, &scene.start, scene.world.clone())?;
+    let names = Names::new(known, world.header());
+    let (limit_names, limits): (Vec<String>, Vec<Box<dyn Limit>>) = scene.limits(known).into_iter().unzip();
+    let limits: Vec<&dyn Limit> = limits.iter().map(|limit| &**limit as &dyn Limit).collect();
+    let mut servo = ServoLoop::new(controller, scene.settings);
+    let (mut moments, mut commands) = (Vec::new(), 0);
+    loop {
+        let target = scene.target.at(world.time());
+        let goal = world.exact(&target);
+        servo.aim(&sightings(&names, &goal));
+        let sample = world.look();
+        let seen = names.sightings(&sample);
+        let readings = sample.joints.as_deref().unwrap_or_default();
+        let now = Measurement { time: sample.time.unwrap_or(f64::NAN), joints: readings, seen: &seen };
+        let tick = servo.tick(world.time(), &now, &limits, scene.dt)?;
+        let moment = Moment {
+            time: world.time(),
+            error_px: tick.error_px,
+            error_m: world.distance(&target),
+            joints: world.joints().to_vec(),
+            pixels: sample.pixels,
+            goal,
+            active: tick.active,
+            command: tick.command,
+            waits: tick.waits,
+        };
+        let went_on = watch(&moment).is_continue();
+        commands += usize::from(moment.command != Command::Hold);
+        world.execute(&moment.command, scene.dt)?;
+        moments.push(moment);
+        if let Some(stop) = tick.stop {
+            return Ok(Run { moments, stop, commands, limits: limit_names, header: world.header().clone() });
+        }
+        if !went_on {
+            return Err(Error::Cancelled);
+        }
+    }
+}
+
+fn sightings(names: &Names, pixels: &[Detection]) -> Vec<Sighting> {
+    names.sightings(&Sample { pixels: pixels.to_vec(), ..Sample::default() })
+}
+
+/// That a scene fits its true rig, and ends.
+fn check(truth: &Rig, scene: &Scene) -> Result<(), Error> {
+    let n = truth.robot.joints.len();
+    let lists = [
+        ("start", scene.start.len()),
+        ("target.joints", scene.target.joints.len()),
+        ("target.velocity", if scene.target.velocity.is_empty() { n } else { scene.target.velocity.len() }),
+    ];
+    for (name, found) in lists {
+        if found != n {
+            return Err(Error::Unusable(format!("`{name}` of the scene has {found} numbers, the rig has {n} joints")));
+        }
+    }
+    let LoopSettings { timeout, .. } = scene.settings;
+    let ticks = timeout / scene.dt;
+    if ticks > MOST_TICKS {
+        return Err(Error::Unusable(format!(
+            "a loop of {timeout} s in steps of {} s would have {ticks:.0} steps, at most {MOST_TICKS} are run",
+            scene.dt
+        )));
+    }
+    Ok(())
+}
+
+/// More steps than anybody wants to see.
+const MOST_TICKS: f64 = 1e6;
+
+/// Strength of a scene's limits against each other.
+const STRENGTH: f64 = 10.0;
+
+impl Scene {
+    /// The limits for a rig, one by one, with their names.
+    fn limits(&self, known: &Rig) -> Vec<(String, Box<dyn Limit>)> {
+        let features: Vec<usize> = (0..known.features.len()).collect();
+        let mut limits: Vec<(String, Box<dyn Limit>)> = Vec::new();
+        for (name, kind) in &self.limits {
+            let cameras = 0..known.cameras.len();
+            let mut add = |limit: Box<dyn Limit>| limits.push((name.clone(), limit));
+            match *kind {
+                LimitKind::InImage(margin) => cameras.for_each(|camera| {
+                    add(Box::new(InImage { camera, features: features.clone(), margin, strength: STRENGTH }));
+                }),
+                LimitKind::PixelSpeed(speed) => cameras.for_each(|camera| {
+                    add(Box::new(PixelSpeed { camera, features: features.clone(), speed, strength: STRENGTH }));
+                }),
+                LimitKind::TipSpeed(speed) => add(Box::new(TipSpeed { speed, strength: STRENGTH })),
+                LimitKind::HalfSpace(normal, offset) => add(Box::new(HalfSpace { normal, offset, strength: STRENGTH })),
+            }
+        }
+        limits
+    }
+}

@@ -1,0 +1,113 @@
+//! Why a servo loop stops.
+use super::{Active, Bound, Constraint};
+use crate::rig::Rig;
+
+/// Why a loop moves no more.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Stop {
+    /// The features are where they shall be.
+    Converged {
+        /// Mean pixel distance that is left [px].
+        error_px: f64,
+    },
+    /// The error falls no more, although nothing holds the arm back: noise keeps it where it is.
+    NoBetter {
+        /// Mean pixel distance over the last measurements [px].
+        error_px: f64,
+        /// Its standard deviation from one measurement to the next [px].
+        sd_px: f64,
+    },
+    /// Limits leave no motion that helps.
+    Blocked {
+        /// Mean pixel distance that is left [px].
+        error_px: f64,
+        /// The limits.
+        by: Vec<Active>,
+    },
+    /// The error grew beyond any use.
+    Diverged {
+        /// Mean pixel distance when the loop began [px].
+        from_px: f64,
+        /// Mean pixel distance now [px].
+        error_px: f64,
+    },
+    /// Nothing could be made of what was seen for too long.
+    Lost {
+        /// Why the last measurement was of no use.
+        why: String,
+        /// For how long [s].
+        seconds: f64,
+    },
+    /// The time is up.
+    TimedOut {
+        /// Mean pixel distance that is left [px], if it is known.
+        error_px: Option<f64>,
+        /// How much time there was [s].
+        seconds: f64,
+    },
+}
+
+impl Stop {
+    /// One word for programs.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Stop::Converged { .. } => "converged",
+            Stop::NoBetter { .. } => "no-better",
+            Stop::Blocked { .. } => "blocked",
+            Stop::Diverged { .. } => "diverged",
+            Stop::Lost { .. } => "lost",
+            Stop::TimedOut { .. } => "timed-out",
+        }
+    }
+
+    /// True where the features are as near as they can be brought.
+    pub fn is_success(&self) -> bool {
+        matches!(self, Stop::Converged { .. } | Stop::NoBetter { .. })
+    }
+
+    /// In words. `limits`: what the limits of the loop are called, in their order.
+    pub fn words(&self, rig: &Rig, limits: &[String]) -> String {
+        match self {
+            Stop::Converged { error_px } => format!("converged: {error_px:.3} px"),
+            Stop::NoBetter { error_px, sd_px } => {
+                format!(
+                    "cannot do better than {error_px:.3} px, which varies by {sd_px:.3} px from one measurement to the next"
+                )
+            }
+            Stop::Blocked { error_px, by } => {
+                let mut names: Vec<String> = by.iter().map(|active| active.words(rig, limits)).collect();
+                names.sort();
+                names.dedup();
+                format!("blocked at {error_px:.3} px by {}", names.join(", "))
+            }
+            Stop::Diverged { from_px, error_px } => format!("diverged: from {from_px:.3} px to {error_px:.3} px"),
+            Stop::Lost { why, seconds } => format!("lost for {seconds:.3} s: {why}"),
+            Stop::TimedOut { error_px: Some(error_px), seconds } => {
+                format!("timed out after {seconds:.3} s at {error_px:.3} px")
+            }
+            Stop::TimedOut { error_px: None, seconds } => format!("timed out after {seconds:.3} s without an error"),
+        }
+    }
+}
+
+impl Active {
+    /// What holds the motion back, in words. `limits`: what the limits of the loop are called, in their order.
+    pub fn words(&self, rig: &Rig, limits: &[String]) -> String {
+        match self.constraint {
+            Constraint::Joint { joint, bound, upper } => {
+                let end = if upper { "upper" } else { "lower" };
+                let what = match bound {
+                    Bound::None => "bound",
+                    Bound::Position => "limit",
+                    Bound::Velocity => "speed limit",
+                    Bound::Acceleration => "acceleration limit",
+                };
+                let joint = rig.robot.joints.get(joint).map_or("?", |joint| joint.name.as_str());
+                format!("the {end} {what} of joint `{joint}`")
+            }
+            Constraint::Limit { limit, .. } => {
+                limits.get(limit).map_or_else(|| format!("limit {}", limit + 1), |name| format!("limit `{name}`"))
+            }
+        }
+    }
+}

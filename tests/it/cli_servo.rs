@@ -1,0 +1,140 @@
+//! `handeye servo`: scenes run, say why they stop, and what is wrong with one is said with its place.
+use crate::cli::Folder;
+use handeye::rig::{Model, catalog};
+use handeye::scene;
+use serde_json::Value;
+
+/// A scene without anything that has a default.
+const SCENE: &str = "\
+rig = \"ur5\"
+[robot]
+start = [-0.6, -1.7, 1.7, -1.2, -1.2, -0.5]
+[target]
+joints = [0.5, -1.3, 1.2, -1.6, -1.7, 0.6]
+";
+
+/// Its joints.
+const START: [f64; 6] = [-0.6, -1.7, 1.7, -1.2, -1.2, -0.5];
+const TARGET: [f64; 6] = [0.5, -1.3, 1.2, -1.6, -1.7, 0.6];
+
+#[test]
+fn every_shipped_scene_ends_where_its_noise_allows_and_is_drawn() {
+    let folder = Folder::new("scenes");
+    for (name, _) in scene::ALL {
+        let (text, _) = folder.expect(0, &format!("servo ur5 {name} --plot {name}.svg"));
+        let last = text.lines().last().unwrap();
+        assert!(last.contains("converged") || last.contains("cannot do better"), "{name}: {last}");
+        let drawing = folder.read(&format!("{name}.svg"));
+        assert!(drawing.starts_with("<svg") && drawing.ends_with("</svg>\n") && !drawing.contains("NaN"), "{name}");
+        assert!(drawing.contains("pixel error [px]") && drawing.contains("camera right"), "{name}");
+        let (json, _) = folder.expect(0, &format!("servo ur5 {name} --json"));
+        let json: Value = serde_json::from_str(&json).unwrap();
+        let steps = json["steps"].as_array().unwrap();
+        let error = |step: &Value| step["error_px"].as_f64().unwrap();
+        assert!(error(&steps[steps.len() - 1]) < 0.2 * error(&steps[0]), "{name}");
+    }
+}
+
+#[test]
+fn a_rig_learned_from_the_recording_alone_reaches_the_target_in_two_commands() {
+    let folder = Folder::new("servo-learned");
+    folder.expect(0, "simulate ur5 --samples 50 --seed 1 -o motions.jsonl");
+    folder.expect(0, "calibrate motions.jsonl -o learned.toml");
+    folder.write("scene.toml", SCENE);
+    let (json, _) = folder.expect(0, "servo learned.toml scene.toml --json");
+    let json: Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["stop"], "converged");
+    let steps = json["steps"].as_array().unwrap();
+    assert!(
+        steps[0]["error_px"].as_f64().unwrap() > 100.0 && steps[2]["error_px"].as_f64().unwrap() < 0.5,
+        "{steps:?}"
+    );
+}
+
+#[test]
+fn the_same_seed_gives_the_same_run_and_another_seed_another() {
+    let folder = Folder::new("servo-seeds");
+    let run = |seed: u64| folder.expect(0, &format!("servo ur5 ur5-noisy --json --seed {seed}")).0;
+    assert_eq!(run(3), run(3));
+    assert_ne!(run(3), run(4));
+}
+
+#[test]
+fn a_loop_that_ends_badly_has_status_1_and_its_reason() {
+    let folder = Folder::new("servo-bad-end");
+    folder.write("lost.toml", &format!("{SCENE}[tracker]\nmissed = 1.0\n"));
+    let (text, complaint) = folder.expect(1, "servo ur5 lost.toml");
+    assert!(complaint.contains("lost for 5.000 s: none of the features of the goal is seen"), "{complaint}");
+    assert!(text.contains("waits: none of the features"), "{text}");
+    let slow = SCENE.replace("[target]", "latency = 0.8\n[target]");
+    folder.write("stale.toml", &slow);
+    let (_, complaint) = folder.expect(1, "servo ur5 stale.toml");
+    assert!(complaint.contains("what was measured is 0.800 s old"), "{complaint}");
+    // Halfway between start and target.
+    let model = Model::new(&catalog::rig("ur5").unwrap()).unwrap();
+    let [from, to] = [START, TARGET].map(|joints| model.tip(&joints).translation);
+    let (normal, middle) = (to - from, 0.5 * (from + to));
+    let wall = format!(
+        "[limits]\nhalf_spaces = [{{ name = \"wall\", normal = {:?}, offset = {} }}]\n[loop]\nwindow = 30\n",
+        normal.as_slice(),
+        normal.dot(&middle)
+    );
+    folder.write("wall.toml", &format!("{SCENE}{wall}"));
+    let (_, complaint) = folder.expect(1, "servo ur5 wall.toml");
+    assert!(complaint.contains("blocked at") && complaint.contains("limit `wall`"), "{complaint}");
+}
+
+#[test]
+fn a_target_that_moves_is_followed_to_the_end_of_the_time() {
+    let folder = Folder::new("servo-follow");
+    let moving = SCENE.to_owned()
+        + "velocity = [-0.02, 0.0, 0.0, 0.01, 0.0, 0.0]\nuntil = 20.0\n[loop]\nfollow = true\ntimeout = 40.0\n";
+    folder.write("moving.toml", &moving);
+    let (text, _) = folder.expect(0, "servo ur5 moving.toml");
+    assert!(text.lines().last().unwrap().contains("timed out after 40.000 s at 0.000 px"), "{text}");
+}
+
+#[test]
+fn what_is_wrong_with_a_scene_is_said_with_its_place_and_what_would_do() {
+    let folder = Folder::new("servo-scenes");
+    let cases = [
+        ("", "scene.toml:1:1: has no table `robot`, which says where the arm starts"),
+        ("rig = \"ur55\"\n", "scene.toml:1:7: `rig`: `ur55` is no rig file beside the scene"),
+        ("[robots]\n", "scene.toml:1:2: unknown key `robots` (did you mean `robot`?)"),
+        ("[robot]\nstart = [1, 2]\n", "scene.toml:1:1: has no table `target`"),
+        (
+            "rig = \"ur5\"\n[robot]\nstart = [1, 2]\n[target]\n",
+            "scene.toml:3:9: robot: `start`: has 2 numbers, the rig has 6 joints",
+        ),
+        (
+            "[robot]\ntakes = \"steps\"\n[target]\n",
+            "scene.toml:2:9: robot: `takes`: unknown kind of command `steps` (known: joints,",
+        ),
+        (
+            "[robot]\n[target]\n[tracker]\nkind = \"gaussian\"\n",
+            "scene.toml:3:2: tracker: is gaussian and has no `sd` (px)",
+        ),
+        (
+            "[robot]\n[target]\n[tracker]\nmissed = 2\n",
+            "scene.toml:4:10: tracker: `missed`: must be from 0 to 1, found 2",
+        ),
+        ("dt = 0\n[robot]\nstart=[0]\n[target]\njoints=[0]\n", "scene.toml:1:6: `dt`: must be above 0, found 0"),
+    ];
+    for (text, message) in cases {
+        folder.write("scene.toml", text);
+        let (_, complaint) = folder.expect(2, "servo ur5 scene.toml");
+        assert!(complaint.contains(message), "{text}\n{complaint}\n{message}");
+    }
+    folder.write("scene.toml", "[robot]\nstart = [1, 2]\n[target]\njoints = [1, 2]\n");
+    let (_, complaint) = folder.expect(2, "servo ur5 scene.toml");
+    assert!(complaint.contains("`start` of the scene has 2 numbers, the rig has 6 joints"), "{complaint}");
+    folder.write("scene.toml", &format!("dt = 1e-9\n{SCENE}"));
+    let (_, complaint) = folder.expect(2, "servo ur5 scene.toml");
+    assert!(complaint.contains("at most 1000000 are run"), "{complaint}");
+    let (_, complaint) = folder.expect(2, "servo ur5 nowhere");
+    assert!(
+        complaint.contains("nowhere: neither a scene file nor a shipped scene (known: ur5-reach, ur5-noisy)"),
+        "{complaint}"
+    );
+    assert_eq!(folder.names(), ["scene.toml"], "a failed run writes nothing");
+}
