@@ -2,15 +2,23 @@
 //! George, "Learning a generative model for robot control using visual feedback".
 //!
 //! One file each; being listed in [`ALL`] is what runs it from the command line and covers it by the tests.
+mod figure10;
+mod figure11;
 mod figure3;
 mod figure4;
 mod figure5;
 mod figure6;
 mod figure7;
+mod figure8;
+mod figure9;
 mod graph;
+mod grasping;
+mod insertion;
+mod manipulation;
 mod outcome;
 mod plot;
 mod relearn;
+mod servoing;
 mod setting;
 mod table1;
 mod table2;
@@ -20,6 +28,7 @@ mod table5;
 mod table6;
 mod table7;
 mod table8;
+mod unobserved;
 
 pub use outcome::{Outcome, Published, Row};
 pub use plot::svg;
@@ -67,6 +76,12 @@ pub const ALL: &[Experiment] = &[
     figure7::EXPERIMENT,
     table7::EXPERIMENT,
     table8::EXPERIMENT,
+    figure8::EXPERIMENT,
+    figure9::EXPERIMENT,
+    figure10::EXPERIMENT,
+    figure11::EXPERIMENT,
+    grasping::EXPERIMENT,
+    insertion::EXPERIMENT,
 ];
 
 /// The experiment of that name.

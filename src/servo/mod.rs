@@ -4,6 +4,7 @@
 //! [`tasks`] say where to go, each with a standard deviation, so that tasks in pixels, metres and radians add up; [`limits`] say what
 //! must not happen. A [`Stepper`] gathers their rows from a rig, and a [`MotionSolver`] finds the motion from rows, wherever they come
 //! from. Everything is kept between steps: a loop with goals of one priority allocates nothing of its own after its first step.
+mod approach;
 mod arm;
 mod controller;
 mod joint_bounds;
@@ -19,6 +20,7 @@ mod takes;
 pub mod tasks;
 
 pub use crate::simulate::world::Command;
+pub use approach::stretched;
 pub use arm::{Arm, Configuration, Sight};
 pub use controller::{Controller, Decision, Measurement};
 pub use joint_bounds::{Bound, JointBounds};

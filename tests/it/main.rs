@@ -22,6 +22,7 @@ mod recording_files;
 mod relearn;
 mod rig_files;
 mod servo;
+mod servo_experiments;
 mod servo_loop;
 mod simulate;
 mod states;

@@ -13,8 +13,9 @@ use super::views::{pixel_inside, sizes};
 use super::{header, in_natural_order};
 use crate::Error;
 use crate::recording::{Detection, Recording, Sample};
-use crate::rig::{Model, Parent, Rig};
+use crate::rig::{Model, ModelFeature, Parent, Rig};
 use handeye_solvers::Pose;
+use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -130,6 +131,18 @@ impl World {
         self.objects.len() - 1
     }
 
+    /// Puts the arm at these joints [rad or m], without a motion.
+    ///
+    /// Errors: [`Error::Unusable`] where they are not as many as the robot's.
+    pub fn place(&mut self, joints: &[f64]) -> Result<(), Error> {
+        if joints.len() != self.joints.len() {
+            return Err(Error::Unusable(format!("the robot has {} joints, not {}", self.joints.len(), joints.len())));
+        }
+        self.joints = joints.to_vec();
+        self.past = VecDeque::from([(self.time, self.joints.clone(), self.objects.clone())]);
+        Ok(())
+    }
+
     /// Closes the gripper on an object, wherever it is: from now on it moves with the tip. Nothing happens for an unknown number.
     pub fn grasp(&mut self, object: usize) {
         let tip = self.robot.chain.tip(&self.joints);
@@ -141,6 +154,13 @@ impl World {
     /// An object, with where it is.
     pub fn object(&self, object: usize) -> Option<&Object> {
         self.objects.get(object)
+    }
+
+    /// Where a feature of the rig truly is [m]; NaN for one that there is not.
+    pub fn feature(&self, feature: usize) -> Vector3<f64> {
+        let is_known = feature < self.model.features.len();
+        let links = self.model.links(&self.joints);
+        if is_known { in_world(&self.model, feature, &links, &self.objects) } else { Vector3::repeat(f64::NAN) }
     }
 
     /// Seconds since the beginning.
@@ -230,17 +250,7 @@ impl World {
 /// Exact pixels of all features in view, in the order of recordings.
 fn detections(model: &Model, sizes: &[[f64; 2]], places: &[u32], joints: &[f64], objects: &[Object]) -> Vec<Detection> {
     let links = model.links(joints);
-    let tip = model.carrier(Parent::Tip, &links);
-    let in_world: Vec<_> = model
-        .features
-        .iter()
-        .enumerate()
-        .map(|(index, feature)| {
-            let object = objects.iter().find(|object| object.features.contains(&index));
-            let carrier = object.map_or_else(|| model.carrier(feature.parent, &links), |object| object.carrier(&tip));
-            carrier.transform(&feature.xyz)
-        })
-        .collect();
+    let in_world: Vec<_> = (0..model.features.len()).map(|feature| in_world(model, feature, &links, objects)).collect();
     let mut seen = Vec::new();
     for (index, camera) in model.cameras.iter().enumerate() {
         let world_from_camera = model.carrier(camera.parent, &links) * camera.pose;
@@ -251,4 +261,13 @@ fn detections(model: &Model, sizes: &[[f64; 2]], places: &[u32], joints: &[f64],
     }
     seen.sort_unstable_by_key(|detection| (detection.camera, detection.feature));
     seen
+}
+
+/// Where a feature is, on its link or on its object [m].
+fn in_world(model: &Model, feature: usize, links: &[Pose], objects: &[Object]) -> Vector3<f64> {
+    let object = objects.iter().find(|object| object.features.contains(&feature));
+    let tip = model.carrier(Parent::Tip, links);
+    let ModelFeature { parent, xyz } = &model.features[feature];
+    let carrier = object.map_or_else(|| model.carrier(*parent, links), |object| object.carrier(&tip));
+    carrier.transform(xyz)
 }
