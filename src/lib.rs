@@ -10,6 +10,7 @@ pub mod factors;
 pub mod geometry;
 pub mod infer;
 pub mod online;
+mod reach;
 pub mod recording;
 pub mod rig;
 pub mod scene;

@@ -1,5 +1,6 @@
 //! A recording in memory.
 use crate::camera::CameraModel;
+use crate::rig::Camera;
 use handeye_solvers::Pose;
 use nalgebra::Matrix6;
 
@@ -35,6 +36,22 @@ pub struct RecordedCamera {
     pub cy: Option<f64>,
     /// Distortion coefficients of the model.
     pub distortion: Option<Vec<f64>>,
+}
+
+impl From<&Camera> for RecordedCamera {
+    /// What a rig says of the camera, its place apart.
+    fn from(camera: &Camera) -> Self {
+        RecordedCamera {
+            name: camera.name.clone(),
+            size: camera.size,
+            model: camera.model,
+            fx: camera.fx,
+            fy: camera.fy,
+            cx: camera.cx,
+            cy: camera.cy,
+            distortion: camera.distortion.clone().filter(|coefficients| !coefficients.is_empty()),
+        }
+    }
 }
 
 /// One moment. What was not measured is `None` or empty.

@@ -1,18 +1,17 @@
 //! Simulation: a complete rig to a recording of random motions, with stated noise and seed.
 mod measure;
-mod motions;
 mod random_rig;
-mod views;
 pub mod world;
 
 pub use random_rig::random_rig;
 
 use crate::Error;
+use crate::reach::{Motions, Need, Views, range};
 use crate::recording::{RecordedCamera, Recording, Sample, natural_order};
-use crate::rig::{Camera, Model, Rig};
+use crate::rig::{Model, Rig};
 use handeye_solvers::Pose;
-use motions::Motions;
-use views::Views;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 
 /// What to simulate. The noise is that of the rig's `[noise]`.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,6 +33,18 @@ pub struct SimulateOptions {
 impl Default for SimulateOptions {
     fn default() -> Self {
         SimulateOptions { samples: 50, seed: 1, missed: 0.0, outliers: 0.0, in_view: 0.5, min_features: 4 }
+    }
+}
+
+impl SimulateOptions {
+    /// How many features have to be in view in every sample.
+    fn need(&self, rig: &Rig) -> Need {
+        let n_features = rig.features.len();
+        Need {
+            per_camera: (self.in_view * n_features as f64).ceil() as usize,
+            in_total: self.min_features.min(n_features * rig.cameras.len()),
+            ..Need::default()
+        }
     }
 }
 
@@ -61,8 +72,9 @@ pub struct Simulation {
 pub fn simulate(rig: &Rig, options: &SimulateOptions) -> Result<Simulation, Error> {
     check(options)?;
     let model = Model::new(rig)?;
-    let views = Views::new(rig, &model, options)?;
-    let mut motions = Motions::new(rig, &views, options.seed)?;
+    let views = Views::new(rig, &model, options.need(rig))?;
+    let ranges = rig.robot.joints.iter().map(|joint| range(joint, None)).collect::<Result<_, _>>()?;
+    let mut motions = Motions::new(rig, &views, ranges, ChaCha8Rng::seed_from_u64(options.seed));
     let positions = (0..options.samples).map(|_| motions.draw()).collect::<Result<Vec<_>, _>>()?;
     let truth = record(rig, &model, &views, positions);
     let measure::Measured { recording, missed, outliers } = measure::measure(&truth, rig, options);
@@ -109,7 +121,7 @@ fn record(rig: &Rig, model: &Model, views: &Views<'_>, positions: Vec<Vec<f64>>)
     };
     Recording {
         joints: rig.robot.joints.iter().map(|joint| joint.name.clone()).collect(),
-        cameras: rig.cameras.iter().map(header).collect(),
+        cameras: rig.cameras.iter().map(RecordedCamera::from).collect(),
         features,
         samples: (0..positions.len()).map(sample).collect(),
     }
@@ -124,17 +136,4 @@ fn in_natural_order(rig: &Rig) -> (Vec<String>, Vec<u32>) {
         places[index] = place as u32;
     }
     (order.iter().map(|&index| rig.features[index].name.clone()).collect(), places)
-}
-
-fn header(camera: &Camera) -> RecordedCamera {
-    RecordedCamera {
-        name: camera.name.clone(),
-        size: camera.size,
-        model: camera.model,
-        fx: camera.fx,
-        fy: camera.fy,
-        cx: camera.cx,
-        cy: camera.cy,
-        distortion: camera.distortion.clone().filter(|coefficients| !coefficients.is_empty()),
-    }
 }

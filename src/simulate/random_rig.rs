@@ -1,7 +1,7 @@
 //! Random rigs, for tests and benches that shall not depend on one robot.
 use super::SimulateOptions;
-use super::views::Views;
 use crate::camera::CameraModel;
+use crate::reach::Views;
 use crate::rig::{Camera, Feature, Joint, Limits, Model, Noise, Parent, Rig};
 use handeye_solvers::Pose;
 use nalgebra::{Matrix3, Vector3};
@@ -130,7 +130,7 @@ fn is_viewable(rig: &Rig, positions: &[Vec<f64>]) -> bool {
         return true;
     }
     let model = Model::new(rig).expect("the rig is complete");
-    let views = Views::new(rig, &model, &SimulateOptions::default()).expect("every camera has a size");
+    let views = Views::new(rig, &model, SimulateOptions::default().need(rig)).expect("every camera has a size");
     let mut in_view = vec![0; rig.cameras.len()];
     positions.iter().filter(|joints| views.shortfall(joints, &mut in_view).features == 0).count() >= VIEWABLE
 }

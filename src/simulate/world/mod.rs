@@ -9,10 +9,10 @@ pub use object::Object;
 pub use robot::Execution;
 pub use tracker::Tracker;
 
-use super::views::{pixel_inside, sizes};
-use super::{header, in_natural_order};
+use super::in_natural_order;
 use crate::Error;
-use crate::recording::{Detection, Recording, Sample};
+use crate::reach::{pixel_inside, sizes};
+use crate::recording::{Detection, RecordedCamera, Recording, Sample};
 use crate::rig::{Model, ModelFeature, Parent, Rig};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
@@ -103,7 +103,7 @@ impl World {
             sizes: sizes(rig)?,
             header: Recording {
                 joints: rig.robot.joints.iter().map(|joint| joint.name.clone()).collect(),
-                cameras: rig.cameras.iter().map(header).collect(),
+                cameras: rig.cameras.iter().map(RecordedCamera::from).collect(),
                 features,
                 samples: Vec::new(),
             },

@@ -1,9 +1,9 @@
 //! Random joint positions within the limits that have the features in view.
-use super::views::Views;
+use super::views::{Need, Shortfall, Views};
 use crate::Error;
 use crate::chain::JointKind;
 use crate::rig::{Joint, Rig};
-use rand::{RngExt, SeedableRng};
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::PI;
 
@@ -13,6 +13,9 @@ const DRAWS: usize = 500;
 /// Steps of such a walk.
 const STEPS: usize = 500;
 
+/// Steps of a climb.
+const CLIMB: usize = 100;
+
 /// Draws and walks before giving up.
 const RESTARTS: usize = 20;
 
@@ -20,7 +23,7 @@ const RESTARTS: usize = 20;
 const WIDTHS: [f64; 3] = [0.3, 0.1, 0.03];
 
 /// Draws positions one after the other.
-pub(super) struct Motions<'a> {
+pub(crate) struct Motions<'a> {
     views: &'a Views<'a>,
     camera_names: Vec<&'a str>,
     ranges: Vec<[f64; 2]>,
@@ -32,16 +35,17 @@ pub(super) struct Motions<'a> {
 }
 
 impl<'a> Motions<'a> {
-    pub fn new(rig: &'a Rig, views: &'a Views<'a>, seed: u64) -> Result<Self, Error> {
-        Ok(Motions {
+    /// `ranges`: smallest and largest reading of every joint.
+    pub fn new(rig: &'a Rig, views: &'a Views<'a>, ranges: Vec<[f64; 2]>, random: ChaCha8Rng) -> Self {
+        Motions {
             views,
             camera_names: rig.cameras.iter().map(|camera| camera.name.as_str()).collect(),
-            ranges: rig.robot.joints.iter().map(range).collect::<Result<_, _>>()?,
-            random: ChaCha8Rng::seed_from_u64(seed),
+            ranges,
+            random,
             most: vec![0; rig.cameras.len()],
             tried: 0,
             found: 0,
-        })
+        }
     }
 
     /// The next position: uniform among those that have the features in view, or, where they are rare, found by a random
@@ -69,6 +73,22 @@ impl<'a> Motions<'a> {
         Err(self.failure())
     }
 
+    /// A position near by that scores more and has the features in view, by random steps uphill.
+    pub fn climb(&mut self, from: &[f64], score: impl Fn(&[f64]) -> f64) -> Vec<f64> {
+        let (mut joints, mut best) = (from.to_vec(), score(from));
+        for step in 0..CLIMB {
+            let other = self.near(Some(&joints), WIDTHS[step % WIDTHS.len()]);
+            if self.shortfall(&other).features > 0 {
+                continue;
+            }
+            let there = score(&other);
+            if there > best {
+                (joints, best) = (other, there);
+            }
+        }
+        joints
+    }
+
     /// Uniform within the limits, and within a share of the ranges around a position where one is given.
     fn near(&mut self, joints: Option<&[f64]>, width: f64) -> Vec<f64> {
         let random = &mut self.random;
@@ -82,7 +102,7 @@ impl<'a> Motions<'a> {
         self.ranges.iter().enumerate().map(draw).collect()
     }
 
-    fn shortfall(&mut self, joints: &[f64]) -> super::views::Shortfall {
+    fn shortfall(&mut self, joints: &[f64]) -> Shortfall {
         let mut in_view = vec![0; self.most.len()];
         let shortfall = self.views.shortfall(joints, &mut in_view);
         self.most.iter_mut().zip(in_view).for_each(|(most, seen)| *most = seen.max(*most));
@@ -91,18 +111,20 @@ impl<'a> Motions<'a> {
     }
 
     fn failure(&self) -> Error {
-        let Views { per_camera, in_total, model, .. } = self.views;
+        let Views { need: Need { per_camera, in_one, in_total }, model, .. } = self.views;
         let n_features = model.features.len();
         let blind: Vec<String> = self
             .camera_names
             .iter()
             .zip(&self.most)
-            .filter(|&(_, most)| most < per_camera)
+            .filter(|&(_, most)| most < per_camera.max(in_one))
             .map(|(name, most)| format!("camera `{name}` sees at most {most} of {n_features}"))
             .collect();
         let which = if blind.is_empty() { "no camera is to blame alone".to_owned() } else { blind.join(", ") };
         let needed = if *per_camera > 0 {
             format!("every camera has {per_camera} features in view")
+        } else if *in_one > 0 {
+            format!("a camera has {in_one} features in view")
         } else {
             format!("{in_total} features are in view")
         };
@@ -114,23 +136,23 @@ impl<'a> Motions<'a> {
     }
 }
 
-/// Smallest and largest reading of a joint.
-fn range(joint: &Joint) -> Result<[f64; 2], Error> {
+/// Smallest and largest reading of a joint: its limits. Where it has none, `seen` is where it was before; without that, a
+/// revolute joint takes any angle.
+pub(crate) fn range(joint: &Joint, seen: Option<[f64; 2]>) -> Result<[f64; 2], Error> {
     let (lower, upper) = (joint.limits.lower, joint.limits.upper);
-    let range = match joint.kind {
-        JointKind::Revolute => {
+    let range = match (lower, upper, seen) {
+        (Some(lower), Some(upper), _) => [lower, upper],
+        (_, _, Some([least, most])) => [lower.unwrap_or(least), upper.unwrap_or(most)],
+        _ if joint.kind == JointKind::Prismatic => {
+            return Err(Error::Unusable(format!(
+                "joint `{}` is prismatic and has no `limits = {{ lower, upper }}` to move between",
+                joint.name
+            )));
+        }
+        (lower, upper, None) => {
             let lower = lower.unwrap_or_else(|| upper.map_or(-PI, |upper| upper - 2.0 * PI));
             [lower, upper.unwrap_or(if joint.limits.lower.is_some() { lower + 2.0 * PI } else { PI })]
         }
-        JointKind::Prismatic => match (lower, upper) {
-            (Some(lower), Some(upper)) => [lower, upper],
-            _ => {
-                return Err(Error::Unusable(format!(
-                    "joint `{}` is prismatic and has no `limits = {{ lower, upper }}` to move between",
-                    joint.name
-                )));
-            }
-        },
     };
     if !(range[0] <= range[1] && (range[1] - range[0]).is_finite()) {
         return Err(Error::Unusable(format!("joint `{}` has no reading within its limits {range:?}", joint.name)));

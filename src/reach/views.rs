@@ -1,5 +1,4 @@
 //! What the cameras of a complete rig see of its features.
-use super::SimulateOptions;
 use crate::Error;
 use crate::recording::Detection;
 use crate::rig::{Camera, Model, ModelCamera, Rig};
@@ -11,18 +10,26 @@ use nalgebra::Vector3;
 const SAME_DIRECTION: f64 = 1.0 - 1e-9;
 
 /// The cameras, their images, and how much of the features has to be in them.
-pub(super) struct Views<'a> {
+pub(crate) struct Views<'a> {
     pub model: &'a Model,
     sizes: Vec<[f64; 2]>,
-    /// Features that every camera has to have in view.
+    pub need: Need,
+}
+
+/// How many features have to be in view.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Need {
+    /// In every camera.
     pub per_camera: usize,
-    /// Features in view, summed over the cameras.
+    /// In the camera that sees most.
+    pub in_one: usize,
+    /// Summed over the cameras.
     pub in_total: usize,
 }
 
 /// By how much a position misses what has to be in view; ordered, so that a walk can descend it.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
-pub(super) struct Shortfall {
+pub(crate) struct Shortfall {
     /// Features that are missing.
     pub features: usize,
     /// Mean angle between the optical axes and the features out of view [rad]: where to go while none is seen.
@@ -30,19 +37,13 @@ pub(super) struct Shortfall {
 }
 
 impl<'a> Views<'a> {
-    pub fn new(rig: &Rig, model: &'a Model, options: &SimulateOptions) -> Result<Self, Error> {
+    pub fn new(rig: &Rig, model: &'a Model, need: Need) -> Result<Self, Error> {
         for (count, what) in [(rig.cameras.len(), "cameras"), (rig.features.len(), "features")] {
             if count == 0 {
                 return Err(Error::Unusable(format!("the rig has no {what}, so nothing would be seen")));
             }
         }
-        let n_features = rig.features.len();
-        Ok(Views {
-            model,
-            sizes: sizes(rig)?,
-            per_camera: (options.in_view * n_features as f64).ceil() as usize,
-            in_total: options.min_features.min(n_features * rig.cameras.len()),
-        })
+        Ok(Views { model, sizes: sizes(rig)?, need })
     }
 
     /// Exact pixels of all features in view, ordered by camera, then by the rig's features.
@@ -75,9 +76,11 @@ impl<'a> Views<'a> {
                 }
             }
         }
-        let per_camera: usize = in_view.iter().map(|&seen| self.per_camera.saturating_sub(seen)).sum();
-        let in_total = self.in_total.saturating_sub(in_view.iter().sum());
-        Shortfall { features: per_camera.max(in_total), angle: angle / f64::from(n_hidden.max(1)) }
+        let need = self.need;
+        let per_camera: usize = in_view.iter().map(|&seen| need.per_camera.saturating_sub(seen)).sum();
+        let in_one = need.in_one.saturating_sub(in_view.iter().copied().max().unwrap_or(0));
+        let in_total = need.in_total.saturating_sub(in_view.iter().sum());
+        Shortfall { features: per_camera.max(in_one).max(in_total), angle: angle / f64::from(n_hidden.max(1)) }
     }
 
     /// Where a camera sees a feature, if it does.
@@ -88,7 +91,7 @@ impl<'a> Views<'a> {
 }
 
 /// Where a camera with images of this size sees a point of its frame, if it does.
-pub(super) fn pixel_inside(camera: &ModelCamera, [width, height]: [f64; 2], point: &Vector3<f64>) -> Option<[f64; 2]> {
+pub(crate) fn pixel_inside(camera: &ModelCamera, [width, height]: [f64; 2], point: &Vector3<f64>) -> Option<[f64; 2]> {
     let [u, v] = camera.model.project(&camera.intrinsics, point);
     // The centre of the first pixel is 0, so the image begins half a pixel before it.
     let is_inside = (-0.5..width - 0.5).contains(&u) && (-0.5..height - 0.5).contains(&v);
@@ -102,7 +105,7 @@ pub(super) fn pixel_inside(camera: &ModelCamera, [width, height]: [f64; 2], poin
 /// Width and height of every camera's images [px].
 ///
 /// Errors: [`Error::Unusable`] where one is not known.
-pub(super) fn sizes(rig: &Rig) -> Result<Vec<[f64; 2]>, Error> {
+pub(crate) fn sizes(rig: &Rig) -> Result<Vec<[f64; 2]>, Error> {
     let size = |camera: &Camera| match camera.size {
         Some(size) => Ok(size.map(f64::from)),
         None => Err(Error::Unusable(format!(
