@@ -3,11 +3,11 @@
 use super::{Calibration, Observer, Options, calibrate};
 use crate::Error;
 use crate::recording::Recording;
-use crate::rig::{Model, Parameter, Rig, matches};
+use crate::rig::{Camera, Feature, Model, Parameter, Parent, Rig, matches};
 
 /// Learns the parameters that match any of `paths` (globs as in the rig file) from `recording`, from no start: their old values
 /// are forgotten. Everything else is held, and stays as it is to the last bit. Cameras and features of the recording that the rig
-/// does not know are learned too.
+/// does not know are learned too, as if in the world and on the tip; to put them elsewhere, list them in the rig with their parent.
 ///
 /// Intrinsics of a camera that is relearned start at what the recording's header says of it, else at the old ones, and are known
 /// as roughly as those of a new camera. Relearning all of `robot.joints` takes the features on the arm along: a chain has no
@@ -21,13 +21,13 @@ pub fn relearn(
     options: &Options,
     observer: Observer<'_>,
 ) -> Result<Calibration, Error> {
-    check_paths(rig, paths)?;
+    let mut part = with_new_parts(rig, recording);
+    check_paths(&part, paths)?;
     let mut free: Vec<String> = paths.to_vec();
     let whole = |name: &str| is_free(paths, &format!("robot.joints.{name}"));
     if !rig.robot.joints.is_empty() && rig.robot.joints.iter().all(|joint| whole(&joint.name)) {
         free.extend(["features".to_owned(), "robot.base".to_owned()]);
     }
-    let mut part = rig.clone();
     part.fit = None;
     part.estimate.prior.clear();
     forget(&mut part, recording, &free);
@@ -39,7 +39,7 @@ pub fn relearn(
         part.estimate.fixed.push("robot.base".to_owned());
     }
     check_rest(rig, &part, &free)?;
-    check_seen(&part, recording)?;
+    check_seen(rig, &part, &free, recording)?;
     let mut learned = calibrate(&part, recording, options, observer)?;
     learned.rig.estimate.clone_from(&rig.estimate);
     restore(&mut learned.rig, rig, &free);
@@ -47,6 +47,22 @@ pub fn relearn(
         widen(&mut now.joints, &before.joints);
     }
     Ok(learned)
+}
+
+/// The rig with the cameras and features that only the recording has, of which nothing is known.
+fn with_new_parts(rig: &Rig, recording: &Recording) -> Rig {
+    let mut all = rig.clone();
+    for recorded in &recording.cameras {
+        if !rig.cameras.iter().any(|camera| camera.name == recorded.name) {
+            all.cameras.push(Camera { name: recorded.name.clone(), ..Camera::default() });
+        }
+    }
+    for name in &recording.features {
+        if !rig.features.iter().any(|feature| feature.name == *name) {
+            all.features.push(Feature { name: name.clone(), parent: Parent::Tip, xyz: None });
+        }
+    }
+    all
 }
 
 /// Few samples have not been everywhere that the rig was learned.
@@ -74,18 +90,32 @@ fn is_free(paths: &[String], path: &str) -> bool {
     paths.iter().any(|pattern| matches(pattern, path))
 }
 
-/// Every path must name something that the rig has.
+/// Every path must name something that the rig or the recording has.
 fn check_paths(rig: &Rig, paths: &[String]) -> Result<(), Error> {
     let all: Vec<String> = rig.parameters().iter().map(|parameter| parameter.path(rig)).collect();
     for path in paths {
         if path != "robot.base" && !all.iter().any(|known| matches(path, known)) {
             return Err(Error::Unusable(format!(
-                "--relearn `{path}` names nothing in the rig: a path is such as `cameras.left`, `features`, `robot.base` or \
-                 `robot.joints.*.offset`"
+                "--relearn `{path}` names nothing in the rig or the recording, which have {}: a path is such as `cameras.left`, \
+                 `features.tool*`, `robot.base` or `robot.joints.*.offset`",
+                names(rig)
             )));
         }
     }
     Ok(())
+}
+
+/// Joints, cameras and features by name, the first few of each.
+fn names(rig: &Rig) -> String {
+    const MOST: usize = 8;
+    let list = |what: &str, names: Vec<&str>| {
+        let more = if names.len() > MOST { ", ..." } else { "" };
+        format!("{what} {}{more}", names[..names.len().min(MOST)].join(", "))
+    };
+    let joints = rig.robot.joints.iter().map(|joint| joint.name.as_str()).collect();
+    let cameras = rig.cameras.iter().map(|camera| camera.name.as_str()).collect();
+    let features = rig.features.iter().map(|feature| feature.name.as_str()).collect();
+    [list("joints", joints), list("cameras", cameras), list("features", features)].join("; ")
 }
 
 /// Takes out the values that are learned anew.
@@ -94,13 +124,7 @@ fn forget(rig: &mut Rig, recording: &Recording, free: &[String]) {
     let chain = old.robot.joints.iter().all(|joint| is_free(free, &format!("robot.joints.{}", joint.name)));
     for parameter in old.parameters().into_iter().filter(|parameter| is_free(free, &parameter.path(&old))) {
         match parameter {
-            Parameter::Base => rig.robot.base = None,
-            Parameter::JointField { joint, .. } if chain => {
-                let joint = &mut rig.robot.joints[joint];
-                (joint.offset, joint.d, joint.a, joint.alpha, joint.beta) = (None, None, None, None, None);
-            }
-            Parameter::JointField { .. } => {}
-            Parameter::CameraPose(camera) => rig.cameras[camera].pose = None,
+            Parameter::JointField { .. } if !chain => {}
             Parameter::CameraField { camera, .. } => {
                 let camera = &mut rig.cameras[camera];
                 let Some(header) = recording.cameras.iter().find(|recorded| recorded.name == camera.name) else {
@@ -114,8 +138,7 @@ fn forget(rig: &mut Rig, recording: &Recording, free: &[String]) {
                     camera.distortion = header.distortion.clone().or(camera.distortion.take());
                 }
             }
-            Parameter::FeatureXyz(feature) => rig.features[feature].xyz = None,
-            Parameter::TargetPose(target) => rig.targets[target].pose = None,
+            parameter => rig.forget(&parameter),
         }
     }
 }
@@ -137,13 +160,17 @@ fn check_rest(rig: &Rig, part: &Rig, free: &[String]) -> Result<(), Error> {
     }
 }
 
-/// A camera that is learned anew must have seen something.
-fn check_seen(part: &Rig, recording: &Recording) -> Result<(), Error> {
+/// A camera that is learned anew must have seen something; one that only the recording's header names need not.
+fn check_seen(rig: &Rig, part: &Rig, free: &[String], recording: &Recording) -> Result<(), Error> {
     let seen = |name: &str| {
         let is_of = |camera: u32| recording.cameras[camera as usize].name == name;
         recording.samples.iter().any(|sample| sample.pixels.iter().any(|detection| is_of(detection.camera)))
     };
-    match part.cameras.iter().find(|camera| camera.pose.is_none() && !seen(&camera.name)) {
+    let is_asked_for = |(index, camera): &(usize, &Camera)| {
+        camera.pose.is_none() && (*index < rig.cameras.len() || is_free(free, &format!("cameras.{}.pose", camera.name)))
+    };
+    let mut wanted = part.cameras.iter().enumerate().filter(is_asked_for).map(|(_, camera)| camera);
+    match wanted.find(|camera| !seen(&camera.name)) {
         Some(camera) => Err(Error::NotEnoughData(format!(
             "camera `{}` is to be learned, and no sample of the recording has a detection of it",
             camera.name

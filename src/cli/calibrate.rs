@@ -2,7 +2,7 @@
 use super::answer::Answer;
 use super::counts::learned_in_words;
 use super::folds::Folds;
-use super::inputs::{check_output, read_recordings, read_rig};
+use super::inputs::{check_output, read_recordings_with_new, read_rig};
 use super::noise;
 use super::progress::Bar;
 use super::trust;
@@ -28,7 +28,9 @@ Examples:
   handeye calibrate monday.jsonl tuesday.jsonl --rig arm.toml -o learned.toml
   handeye calibrate motions.jsonl --rig ur5 -o learned.toml --folds 5   with held-out errors
   handeye calibrate motions.jsonl --rig arm.toml -o arm.toml            keeps its comments
-  handeye calibrate three.jsonl --rig arm.toml --relearn cameras.left -o arm.toml   a camera that was moved")]
+  handeye calibrate three.jsonl --rig arm.toml --relearn cameras.left -o arm.toml   a camera that was moved
+  handeye calibrate five.jsonl --rig arm.toml --relearn cameras.top -o arm.toml     a camera that is new
+  handeye calibrate two.jsonl --rig arm.toml --relearn 'features.tool*' -o arm.toml another object in the gripper")]
 pub struct Calibrate {
     /// Recordings of one rig
     #[arg(value_name = "REC", required = true)]
@@ -42,7 +44,8 @@ pub struct Calibrate {
     /// Also learn K times without every K-th sample, and report how well those are predicted
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(2..))]
     folds: Option<u32>,
-    /// Learn these parameters anew from few samples and hold everything else: cameras.left, features, robot.base, with *
+    /// Learn these parameters anew from few samples and hold everything else: cameras.left, features, robot.base, with *;
+    /// cameras and features that only the recording has are added
     #[arg(long, value_name = "PATH", requires = "rig", conflicts_with_all = ["select_noise", "folds"])]
     relearn: Vec<String>,
     /// Estimate the noise of pixels, joints, poses and actions from the data; [noise] of the rig is where that starts
@@ -65,7 +68,7 @@ pub struct Calibrate {
 impl Calibrate {
     pub fn run(&self, is_json: bool) -> Result<Answer, Error> {
         let input = self.rig.as_deref().map(read_rig).transpose()?;
-        let recording = read_recordings(&self.recordings, input.as_ref())?;
+        let recording = read_recordings_with_new(&self.recordings, input.as_ref(), &self.relearn)?;
         check_output(&self.output, &self.recordings)?;
         let (mut rig, text) = input.map_or_else(|| (Rig::default(), None), |input| (input.rig, Some(input.text)));
         let options = Options { seed: self.seed, estimate_noise: self.estimate_noise, influence: self.influence };

@@ -1,7 +1,7 @@
 //! Reading a rig and the recordings that go with it, and seeing in time that an output can be written.
 use handeye::Error;
 use handeye::recording::Recording;
-use handeye::rig::{Rig, catalog};
+use handeye::rig::{Rig, catalog, matches};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -28,8 +28,17 @@ pub fn read_rig(argument: &Path) -> Result<RigInput, Error> {
 
 /// Reads recordings as one, and refuses what the rig cannot be the rig of.
 pub fn read_recordings(paths: &[PathBuf], rig: Option<&RigInput>) -> Result<Recording, Error> {
+    read_recordings_with_new(paths, rig, &[])
+}
+
+/// The same where parameters that match any of `new` may be of cameras that the rig does not have yet.
+pub fn read_recordings_with_new(
+    paths: &[PathBuf],
+    rig: Option<&RigInput>,
+    new: &[String],
+) -> Result<Recording, Error> {
     let recording = Recording::read_all(paths)?;
-    if let Some(problem) = rig.and_then(|rig| mismatch(rig, &recording)) {
+    if let Some(problem) = rig.and_then(|rig| mismatch(rig, &recording, new)) {
         let file = paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
         return Err(Error::Malformed { file, line: 1, column: 1, problem });
     }
@@ -37,7 +46,7 @@ pub fn read_recordings(paths: &[PathBuf], rig: Option<&RigInput>) -> Result<Reco
 }
 
 /// Why a recording is not one of this rig.
-fn mismatch(input: &RigInput, recording: &Recording) -> Option<String> {
+fn mismatch(input: &RigInput, recording: &Recording, new: &[String]) -> Option<String> {
     let RigInput { rig, name, .. } = input;
     let (ours, theirs) = (rig.robot.joints.len(), recording.joints.len());
     if ours != theirs && ours > 0 {
@@ -47,11 +56,16 @@ fn mismatch(input: &RigInput, recording: &Recording) -> Option<String> {
         let index = index as u32;
         recording.samples.iter().any(|sample| sample.pixels.iter().any(|detection| detection.camera == index))
     };
-    let is_known = |name: &str| rig.cameras.is_empty() || rig.cameras.iter().any(|camera| camera.name == name);
+    let is_new = |name: &str| new.iter().any(|pattern| matches(pattern, &format!("cameras.{name}.pose")));
+    let is_known = |name: &str| {
+        rig.cameras.is_empty() || rig.cameras.iter().any(|camera| camera.name == name) || is_new(name)
+    };
     let (_, unknown) =
         recording.cameras.iter().enumerate().find(|(index, camera)| !is_known(&camera.name) && is_used(*index))?;
     let known = rig.cameras.iter().map(|camera| camera.name.as_str()).collect::<Vec<_>>().join(", ");
-    Some(format!("camera `{}` is not in the rig {name} (known: {known})", unknown.name))
+    let name_of_it = &unknown.name;
+    let would_do = if new.is_empty() { String::new() } else { format!("; --relearn cameras.{name_of_it} would add it") };
+    Some(format!("camera `{name_of_it}` is not in the rig {name} (known: {known}){would_do}"))
 }
 
 /// Fails where an output could not be written, or would replace one of the inputs: before the work, not after it.

@@ -164,6 +164,36 @@ impl Rig {
         }
     }
 
+    /// Takes a value out, so that it is unknown.
+    pub(crate) fn forget(&mut self, parameter: &Parameter) {
+        match *parameter {
+            Parameter::Base => self.robot.base = None,
+            Parameter::JointField { joint, field } => {
+                let joint = &mut self.robot.joints[joint];
+                match field {
+                    JointField::Offset => joint.offset = None,
+                    JointField::D => joint.d = None,
+                    JointField::A => joint.a = None,
+                    JointField::Alpha => joint.alpha = None,
+                    JointField::Beta => joint.beta = None,
+                }
+            }
+            Parameter::CameraPose(camera) => self.cameras[camera].pose = None,
+            Parameter::CameraField { camera, field } => {
+                let camera = &mut self.cameras[camera];
+                match field {
+                    CameraField::Fx => camera.fx = None,
+                    CameraField::Fy => camera.fy = None,
+                    CameraField::Cx => camera.cx = None,
+                    CameraField::Cy => camera.cy = None,
+                    CameraField::Distortion => camera.distortion = None,
+                }
+            }
+            Parameter::FeatureXyz(feature) => self.features[feature].xyz = None,
+            Parameter::TargetPose(target) => self.targets[target].pose = None,
+        }
+    }
+
     /// True where the parameter is held at its value.
     pub fn is_fixed(&self, parameter: &Parameter) -> bool {
         let path = parameter.path(self);
@@ -175,7 +205,7 @@ impl Rig {
     /// Where several patterns match, the most specific counts: that with the fewest `*`, then the longest.
     pub fn prior_sd(&self, parameter: &Parameter) -> Option<f64> {
         let path = parameter.path(self);
-        let stars = |pattern: &str| pattern.split('.').filter(|component| *component == "*").count();
+        let stars = |pattern: &str| pattern.split('.').filter(|component| component.contains('*')).count();
         let matching = self.estimate.prior.iter().filter(|(pattern, _)| matches(pattern, &path));
         let (_, sd) = matching.min_by_key(|(pattern, _)| {
             (stars(pattern), std::cmp::Reverse(pattern.split('.').count()), std::cmp::Reverse(pattern.len()))
@@ -184,10 +214,21 @@ impl Rig {
     }
 }
 
-/// True where a pattern covers a path: `*` stands for any one component, and a shorter pattern covers all below it.
+/// True where a pattern covers a path: `*` stands for any characters of one component, and a shorter pattern covers all below
+/// it.
 pub fn matches(pattern: &str, path: &str) -> bool {
     let mut components = path.split('.');
-    pattern.split('.').all(|wanted| components.next().is_some_and(|found| wanted == "*" || wanted == found))
+    pattern.split('.').all(|wanted| components.next().is_some_and(|found| covers(wanted, found)))
+}
+
+/// The same of one component.
+pub(crate) fn covers(pattern: &str, name: &str) -> bool {
+    match pattern.split_once('*') {
+        None => pattern == name,
+        Some((start, rest)) => name.strip_prefix(start).is_some_and(|end| {
+            end.char_indices().map(|(i, _)| i).chain([end.len()]).any(|i| covers(rest, &end[i..]))
+        }),
+    }
 }
 
 #[cfg(test)]
@@ -224,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn a_star_stands_for_one_name_and_a_short_path_for_all_below() {
+    fn a_star_stands_for_any_part_of_one_name_and_a_short_path_for_all_below() {
         for (pattern, path, expected) in [
             ("cameras.*.fx", "cameras.left.fx", true),
             ("cameras.*.fx", "cameras.left.fy", false),
@@ -236,6 +277,13 @@ mod tests {
             ("cameras.left.fx.x", "cameras.left.fx", false),
             ("robot.joints.*.a", "robot.joints.elbow.alpha", false),
             ("", "robot.base", false),
+            ("features.tool*", "features.tool12.xyz", true),
+            ("features.tool*", "features.tool.xyz", true),
+            ("features.tool*", "features.board.xyz", false),
+            ("features.*-*-corner", "features.tag-3-corner.xyz", true),
+            ("features.*-*-corner", "features.tag-corner.xyz", false),
+            ("feature*.tool", "features.tool.xyz", true),
+            ("*.tool*", "robot.joints.tool.a", false),
         ] {
             assert_eq!(matches(pattern, path), expected, "{pattern} {path}");
         }

@@ -2,7 +2,7 @@
 use super::document::{Field, Fields, Node};
 use crate::Error;
 use crate::error::suggestion;
-use crate::rig::paths::{CameraField, JointField, matches};
+use crate::rig::paths::{CameraField, JointField, covers, matches};
 use crate::rig::{Estimate, Parameter, Rig};
 use std::collections::BTreeMap;
 
@@ -86,8 +86,10 @@ pub(super) fn problem_of_pattern(pattern: &str, rig: &Rig) -> Option<String> {
         &[&["features"], &features, &["xyz"]],
         &[&["targets"], &targets, &["pose"]],
     ];
-    let fits =
-        |found: &str, known: &[&str]| found == "*" || known.contains(&found) || (known.is_empty() && !found.is_empty());
+    let fits = |found: &str, known: &[&str]| match known {
+        [] => !found.is_empty(),
+        known => known.iter().any(|name| covers(found, name)),
+    };
     // The first component at which no kind of parameter goes on, and what would do there.
     for (place, found) in components.iter().enumerate() {
         let begun = |kind: &&&[&[&str]]| components[..place].iter().zip(kind.iter()).all(|(c, known)| fits(c, known));
