@@ -219,7 +219,8 @@ fn report(
         };
         let median_px = median_with_joints_of(setup, state, &verdict.moved, sample, sample);
         let swapped_with = wrong_joints.iter().take(SWAPPED).find(fits).map(|&other| name(other));
-        verdict.findings.push(Finding::WrongJoints { sample: name(sample), median_px, swapped_with });
+        let by_pose = !setup.states.chain;
+        verdict.findings.push(Finding::WrongJoints { sample: name(sample), median_px, swapped_with, by_pose });
     }
     for &(sample, camera) in wrong_images {
         verdict.findings.push(Finding::WrongImage {

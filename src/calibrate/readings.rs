@@ -46,7 +46,8 @@ pub(super) fn findings(setup: &Setup, state: &State) -> Vec<Finding> {
                 read.tips[sample] = pose;
             }
             let median_px = median(&mut distances_of(setup, &read, sample));
-            Finding::WrongJoints { sample: setup.samples[sample], median_px, swapped_with: None }
+            let by_pose = !setup.states.chain;
+            Finding::WrongJoints { sample: setup.samples[sample], median_px, swapped_with: None, by_pose }
         })
         .collect()
 }

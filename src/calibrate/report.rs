@@ -87,7 +87,8 @@ pub enum Finding {
         /// Of how many.
         of: usize,
     },
-    /// The joints of a sample do not lead to what its images show; it was left out.
+    /// The joints of a sample, or the tip pose where poses are what was read, do not lead to what its images show; it was left
+    /// out.
     WrongJoints {
         /// Index of the sample, from 0.
         sample: usize,
@@ -95,6 +96,8 @@ pub enum Finding {
         median_px: f64,
         /// The sample whose images its joints fit, where the two were swapped.
         swapped_with: Option<usize>,
+        /// True where tip poses were read and no joints.
+        by_pose: bool,
     },
     /// Nothing was read of a sample's state, and its images do not determine it; it was left out.
     UnknownState {
@@ -131,10 +134,11 @@ impl std::fmt::Display for Finding {
                  is wrong, or the fit went astray"
             ),
             Finding::Outliers { count, of } => write!(f, "{count} of {of} detections do not fit and were left out"),
-            Finding::WrongJoints { sample, median_px, swapped_with } => {
-                write!(f, "sample {sample}: its joints do not lead to what the cameras saw ({median_px:.1} px)")?;
+            Finding::WrongJoints { sample, median_px, swapped_with, by_pose } => {
+                let (leads, fits) = if *by_pose { ("tip pose does", "it fits") } else { ("joints do", "they fit") };
+                write!(f, "sample {sample}: its {leads} not lead to what the cameras saw ({median_px:.1} px)")?;
                 match swapped_with {
-                    Some(other) => write!(f, "; they fit the images of sample {other}: the two are swapped"),
+                    Some(other) => write!(f, "; {fits} the images of sample {other}: the two are swapped"),
                     None => Ok(()),
                 }
             }

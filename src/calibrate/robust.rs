@@ -49,9 +49,14 @@ fn check_rest(setup: &Setup, verdict: &Verdict) -> Result<(), Error> {
     if 2 * wrong <= setup.len() {
         return Ok(());
     }
+    let (read, check) = if setup.states.chain {
+        ("joints", "the order, units and kinds of the joints")
+    } else {
+        ("tip poses", "that poses are those of the tip in the world, in metres, with quaternions as x, y, z, w")
+    };
     Err(Error::NotEnoughData(format!(
-        "the joints of {wrong} of {} samples do not lead to what the cameras saw: check that readings and images are of the \
-         same moments, and the order, units and kinds of the joints",
+        "the {read} of {wrong} of {} samples do not lead to what the cameras saw: check that readings and images are of the \
+         same moments, and {check}",
         setup.len()
     )))
 }

@@ -259,9 +259,13 @@ fn finding_json(finding: &Finding) -> Value {
         Finding::UnseenCamera { camera } => json!({ "kind": "unseen_camera", "camera": camera }),
         Finding::Misfit { ratio, stated_px } => json!({ "kind": "misfit", "ratio": ratio, "stated_px": stated_px }),
         Finding::Outliers { count, of } => json!({ "kind": "outliers", "count": count, "of": of }),
-        Finding::WrongJoints { sample, median_px, swapped_with } => {
-            json!({ "kind": "wrong_joints", "sample": sample, "median_px": median_px, "swapped_with": swapped_with })
-        }
+        Finding::WrongJoints { sample, median_px, swapped_with, by_pose } => json!({
+            "kind": "wrong_joints",
+            "read": if *by_pose { "pose" } else { "joints" },
+            "sample": sample,
+            "median_px": median_px,
+            "swapped_with": swapped_with,
+        }),
         Finding::UnknownState { sample } => json!({ "kind": "unknown_state", "sample": sample }),
         Finding::WrongImage { sample, camera, median_px } => {
             json!({ "kind": "wrong_image", "sample": sample, "camera": camera, "median_px": median_px })

@@ -13,6 +13,9 @@ const REPEATED: f64 = 0.2;
 /// A tip that turns by less than this [rad, rms] about every axis but one determines little.
 const TURN: f64 = 0.05;
 
+/// Turns below this [rad, rms] may be the noise of arms and trackers.
+const NOISE: f64 = 0.01;
+
 /// A joint that moves by less than this [rad, m] stands still.
 const STILL: f64 = 1e-3;
 
@@ -75,12 +78,17 @@ fn one_axis(tips: &[Option<Pose>]) -> Option<Finding> {
     let rms = |k: usize| eigen.eigenvalues[order[k]].max(0.0).sqrt();
     let axis: Vector3<f64> = eigen.eigenvectors.column(order[0]).into_owned();
     let axis = axis * axis[axis.iamax()].signum();
-    let what = match (rms(0) > TURN, rms(1) > TURN) {
-        (_, true) => return None,
-        (true, false) => {
-            format!("all rotations are about one axis of the tip: ({:.3}, {:.3}, {:.3})", axis.x, axis.y, axis.z)
-        }
-        (false, false) => "the tip does not turn".to_owned(),
+    let direction = format!("({:.3}, {:.3}, {:.3})", axis.x, axis.y, axis.z);
+    let what = match (rms(0), rms(1)) {
+        (_, second) if second > TURN => return None,
+        (first, _) if first < NOISE => "the tip does not turn".to_owned(),
+        (first, _) if first < TURN => format!("the tip hardly turns: by {:.1}° rms at most", first.to_degrees()),
+        (_, second) if second < NOISE => format!("all rotations are about one axis of the tip: {direction}"),
+        (first, second) => format!(
+            "the tip turns by {:.1}° rms about {direction} and by {:.1}° at most about the axes across it: nearly about one axis",
+            first.to_degrees(),
+            second.to_degrees()
+        ),
     };
     Some(Finding { what, change: "record positions that turn about another axis too, by 30 degrees or more".into() })
 }

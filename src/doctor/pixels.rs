@@ -87,7 +87,7 @@ pub(super) fn examine(rig: &Rig, recording: &Recording, options: &calibrate::Opt
     match best {
         Some((_, finding)) => diagnosis.findings.push(finding),
         // Single rows are judged by a fit, which says nothing where all of the data are wrong.
-        None => diagnosis.findings.extend(found.iter().filter_map(|unfit| swapped(unfit, recording))),
+        None => diagnosis.findings.extend(found.iter().filter_map(swapped)),
     }
 }
 
@@ -108,10 +108,9 @@ fn consider(
 }
 
 /// Rows of joints or tip poses that the calibration itself found to be exchanged.
-fn swapped(unfit: &Unfit, recording: &Recording) -> Option<Finding> {
-    let Unfit::WrongJoints { sample, swapped_with: Some(other), .. } = unfit else { return None };
-    let has_joints = recording.samples.get(*sample).is_some_and(|sample| sample.joints.is_some());
-    let (rows, read) = if has_joints { ("joint rows", "joints") } else { ("robot poses", "robot poses") };
+fn swapped(unfit: &Unfit) -> Option<Finding> {
+    let Unfit::WrongJoints { sample, swapped_with: Some(other), by_pose, .. } = unfit else { return None };
+    let (rows, read) = if *by_pose { ("robot poses", "robot poses") } else { ("joint rows", "joints") };
     (sample < other).then(|| {
         let what = format!("the {rows} of samples {sample} and {other} are swapped");
         finding(&what, &format!("exchange the {read} of the two samples"))

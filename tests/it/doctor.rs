@@ -61,6 +61,30 @@ fn rotations_about_one_axis_are_found_with_the_axis() {
     }
 }
 
+/// A second joint that moves by a few degrees is no noise: that its turns are few is said, not that there are none.
+#[test]
+fn few_turns_about_another_axis_are_not_called_none() {
+    let rig = random_rig(6, 2, 12, 3);
+    let mut recording = simulate(&rig, &SimulateOptions::default()).unwrap().recording;
+    let home = recording.samples[0].joints.clone().unwrap();
+    let mut told = |first: f64, second: f64| {
+        for (index, sample) in recording.samples.iter_mut().enumerate() {
+            let (s, c) = (1.7 * index as f64).sin_cos();
+            let mut joints = home.clone();
+            (joints[1], joints[4]) = (home[1] + first * s, home[4] + second * c);
+            (sample.joints, sample.pixels) = (Some(joints), Vec::new());
+        }
+        found(&rig, &recording)
+    };
+    let few = told(0.8, 0.04);
+    assert!(few.len() == 1 && few[0].contains("nearly about one axis"), "{few:?}");
+    let none = told(0.8, 0.002);
+    assert!(none.len() == 1 && none[0].contains("all rotations are about one axis of the tip: ("), "{none:?}");
+    let hardly = told(0.03, 0.02);
+    assert!(hardly.len() == 1 && hardly[0].contains("the tip hardly turns: by "), "{hardly:?}");
+    assert!(told(0.8, 0.8).is_empty());
+}
+
 /// One test per fault, which takes several calibrations for every seed.
 macro_rules! mistakes_of_pixels {
     ($($test:ident: $faults:ident, $fault:literal;)*) => {$(

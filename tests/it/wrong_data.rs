@@ -174,3 +174,21 @@ fn a_camera_that_is_bumped_halfway_is_named() {
 fn a_camera_that_is_bumped_late_stays_where_it_was_before() {
     a_bump_is_named(4 * SAMPLES / 5);
 }
+
+#[test]
+fn a_wrong_tip_pose_is_called_that() {
+    let truth = random_rig(6, 2, 12, 3);
+    let simulated = simulate(&truth, &SimulateOptions { samples: SAMPLES, ..SimulateOptions::default() }).unwrap();
+    let mut recording = simulated.recording;
+    recording.joints.clear();
+    for (sample, truth) in recording.samples.iter_mut().zip(&simulated.truth.samples) {
+        (sample.joints, sample.pose) = (None, truth.pose);
+    }
+    let mut swapped = recording.clone();
+    (swapped.samples[4].pose, swapped.samples[9].pose) = (recording.samples[9].pose, recording.samples[4].pose);
+    let findings = learn(&nothing(&truth), &swapped).unwrap().report.findings;
+    let told: Vec<String> = findings.iter().map(Finding::to_string).collect();
+    assert_eq!(told.len(), 2, "{told:?}");
+    assert!(told[0].starts_with("sample 4: its tip pose does not lead to what the cameras saw"), "{told:?}");
+    assert!(told[0].ends_with("it fits the images of sample 9: the two are swapped"), "{told:?}");
+}
