@@ -1,7 +1,8 @@
 //! What users write: residuals on variables, and functions that derive one variable from others.
-use crate::jacobian::{Jacobian, forward};
+use crate::jacobian::{Columns, Coordinates, Jacobian, forward};
 use crate::scalar::Dual;
 use crate::{Scalar, Variable, Variables};
+use nalgebra::DMatrix;
 
 /// Steps of derived nodes up to this length are kept on the stack.
 const SHORT: usize = 12;
@@ -47,6 +48,25 @@ pub trait Factor<const M: usize>: Send + Sync + 'static {
                 r.map(|value| value.value())
             }
         }
+    }
+
+    /// The residual at the given variables and its Jacobian, outside a graph: for each variable, M rows and one column per
+    /// coordinate of its step.
+    fn linearize(&self, at: &Self::On) -> ([f64; M], Vec<DMatrix<f64>>) {
+        let stored = at.stored();
+        let x: Vec<&[f64]> = stored.iter().map(|(x, _)| x.as_slice()).collect();
+        let mut width = 0;
+        let columns: Vec<Columns<'_>> = stored
+            .iter()
+            .map(|&(_, len)| {
+                width += len;
+                Columns { start: width - len, len, active: len, free: Coordinates::All }
+            })
+            .collect();
+        let mut data = vec![0.0; M * width];
+        let r = self.evaluate(&x, Some(&mut Jacobian { data: &mut data, columns: &columns, width }));
+        let block = |c: &Columns<'_>| DMatrix::from_fn(M, c.len, |row, k| data[row * width + c.start + k]);
+        (r, columns.iter().map(block).collect())
     }
 }
 

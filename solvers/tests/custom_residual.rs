@@ -118,6 +118,21 @@ fn they_pass_the_checks() {
 }
 
 #[test]
+fn derivatives_outside_a_graph_are_those_of_the_formula() {
+    let (x, y) = (-2.0, 0.5);
+    let (residual, blocks) = RangeBearing { range: 2.0, bearing: 0.4 }.linearize(&(Vector::<2>::new(x, y),));
+    let range = x.hypot(y);
+    assert!((residual[0] - (range - 2.0)).abs() < 1e-14, "{residual:?}");
+    let expected = [[x / range, y / range], [-y / (range * range), x / (range * range)]];
+    assert_eq!((blocks.len(), blocks[0].shape()), (1, (2, 2)));
+    for (row, expected) in expected.iter().enumerate() {
+        for (column, expected) in expected.iter().enumerate() {
+            assert!((blocks[0][(row, column)] - expected).abs() < 1e-14, "{}", blocks[0]);
+        }
+    }
+}
+
+#[test]
 fn the_robot_is_found_across_the_cut_at_half_a_turn() {
     let (mut graph, at, heading) = robot(false);
     LevenbergMarquardt::default().minimize(&mut graph).unwrap();

@@ -59,7 +59,7 @@ impl<'a> Honest<'a> {
         Honest { setup, priors: stages.priors, loss: Loss::Squared }
     }
 
-    fn build(&self, freedom: &Freedom, state: &State, verdict: &Verdict) -> Built {
+    pub fn build(&self, freedom: &Freedom, state: &State, verdict: &Verdict) -> Built {
         build(&self.setup, state, freedom, self.priors, self.loss, |index| verdict.active[index])
     }
 }

@@ -14,6 +14,7 @@ mod kinematics;
 mod known;
 mod look;
 mod motion;
+mod numbers;
 mod outliers;
 mod poorly;
 mod priors;
@@ -26,6 +27,7 @@ mod settle;
 mod setup;
 mod stage;
 mod states;
+mod suggest;
 mod targets;
 mod trunk;
 mod unknown;
@@ -39,6 +41,7 @@ pub use influence::{Influence, most_influential, worst_fitting};
 pub use relearn::relearn;
 pub use report::{Calibration, Finding, Report, StageReport, TipDeviation};
 pub use selection::{NoiseTrial, select_noise};
+pub use suggest::{SuggestOptions, SuggestedSample, Suggestion, suggest};
 pub use targets::{Disagreement, TargetReport};
 pub use weak::{Combination, DeterminedBy};
 
@@ -47,7 +50,7 @@ use crate::recording::Recording;
 use crate::rig::{Noise, Parameter, Rig};
 use deviations::{Honest, deviations, scatter};
 use finish::finish;
-use graph::{Priors, State};
+use graph::{Freedom, Priors, State};
 use handeye_solvers::Loss;
 use initialise::initialise;
 use setup::Setup;
@@ -158,21 +161,9 @@ fn attempt(
 ) -> Result<Attempt, Error> {
     let priors = Priors::new(setup);
     let mut stages = Stages::new(setup, &priors, observer);
-    let mut state = match start {
-        Some(state) => state,
-        None if is_complete(setup) => State::new(setup),
-        None => initialise(options.seed, &mut stages)?,
-    };
-    unknown::place_unknown(&mut state, &stages);
-    let (mut freedom, gauge) = gauge::end_to_end(setup, &mut state, &priors);
-    let verdict = robust::fit(&mut state, &freedom, &mut stages)?;
-    robust::place_moved(&mut state, &mut freedom, &verdict, &mut stages)?;
+    let Fitted { state, freedom, gauge, verdict, loss, converged } = fit(&mut stages, start, options.seed)?;
     let takes_part = |index: usize| verdict.active[index];
-    // Where the images are noisier than stated, the tails begin later.
-    let loss = Loss::Cauchy(TAILS * scatter(setup, &state, &verdict).max(1.0));
-    let last = Stage { name: "end to end", freedom: &freedom, loss, takes_part: &takes_part };
-    let converged = stages.minimize(&last, &mut state)?.termination.converged();
-    check_cameras(setup, &state)?;
+    let last = Stage { name: LAST, freedom: &freedom, loss, takes_part: &takes_part };
     let noise = if options.estimate_noise {
         Some(variances::estimate(&stages, &last, &state, &verdict).map_err(|error| {
             Error::NotEnoughData(format!("the noise cannot be estimated where the data leave the rig open: {error}"))
@@ -185,6 +176,40 @@ fn attempt(
     let influence = if options.influence { influence::influence(&stages, &last, &state, &verdict) } else { Vec::new() };
     let reports = std::mem::take(&mut stages.reports);
     Ok(Attempt { state, verdict, reports, converged, gauge, deviations, influence, noise })
+}
+
+/// Name of the last stage.
+const LAST: &str = "end to end";
+
+/// A rig that fits, and what the fit was of.
+struct Fitted {
+    state: State,
+    freedom: Freedom,
+    gauge: Vec<String>,
+    verdict: outliers::Verdict,
+    loss: Loss,
+    converged: bool,
+}
+
+/// Fits from a start, or from nothing.
+fn fit(stages: &mut Stages<'_>, start: Option<State>, seed: u64) -> Result<Fitted, Error> {
+    let setup = stages.setup;
+    let mut state = match start {
+        Some(state) => state,
+        None if is_complete(setup) => State::new(setup),
+        None => initialise(seed, stages)?,
+    };
+    unknown::place_unknown(&mut state, stages);
+    let (mut freedom, gauge) = gauge::end_to_end(setup, &mut state, stages.priors);
+    let verdict = robust::fit(&mut state, &freedom, stages)?;
+    robust::place_moved(&mut state, &mut freedom, &verdict, stages)?;
+    let takes_part = |index: usize| verdict.active[index];
+    // Where the images are noisier than stated, the tails begin later.
+    let loss = Loss::Cauchy(TAILS * scatter(setup, &state, &verdict).max(1.0));
+    let last = Stage { name: LAST, freedom: &freedom, loss, takes_part: &takes_part };
+    let converged = stages.minimize(&last, &mut state)?.termination.converged();
+    check_cameras(setup, &state)?;
+    Ok(Fitted { state, freedom, gauge, verdict, loss, converged })
 }
 
 /// True where targets are what there is to learn from. Where joints and pixels were recorded too, pixels say more.

@@ -3,9 +3,10 @@ use super::deviations::Honest;
 use super::direction::Direction;
 use super::evaluate::median;
 use super::gauge;
-use super::graph::{Built, Freedom, State, row};
+use super::graph::{Built, Freedom, State};
+use super::numbers::Numbers;
 use super::weak::{Combination, DeterminedBy};
-use handeye_solvers::{Component, Covariance, DynamicVector, Key, Pose, Vector};
+use handeye_solvers::{Component, Covariance};
 use nalgebra::{DMatrix, DVector};
 
 /// A case is ill-posed where lengths are known to less than this share of the distance between cameras and features.
@@ -16,13 +17,6 @@ const SMALLEST_WEIGHT: f64 = 1e-3;
 
 /// Samples in which distances are looked at.
 const SAMPLES: usize = 50;
-
-/// A node of the rig, its free coordinates, and which of these are lengths.
-struct Part {
-    key: AnyKey,
-    free: Vec<usize>,
-    lengths: Vec<bool>,
-}
 
 /// The combination that is known worst, where it is known poorly.
 ///
@@ -36,11 +30,12 @@ pub(crate) fn determined(
     covariance: &mut Covariance<'_>,
 ) -> Option<Combination> {
     let distance = distance(honest, state)?;
-    let (parts, sigma) = covariance_of_rig(freedom, built, covariance);
-    let numbers: Vec<(usize, usize, bool)> = parts
-        .iter()
-        .flat_map(|part| part.free.iter().zip(&part.lengths).map(|(&k, &is_length)| (part.key.index(), k, is_length)))
-        .collect();
+    // Lenses are not positions, and follow.
+    let but_lenses = Freedom { intrinsics: vec![[true; 12]; freedom.intrinsics.len()], ..freedom.clone() };
+    let free = Numbers::new(&but_lenses);
+    let sigma = free.covariance(built, covariance);
+    let numbers: Vec<(usize, usize, bool)> =
+        free.iter().map(|(part, k)| (part.node(built), k, part.is_length(k))).collect();
     let lengths: Vec<usize> = (0..numbers.len()).filter(|&i| numbers[i].2).collect();
     if lengths.is_empty() {
         return None;
@@ -71,49 +66,6 @@ pub(crate) fn determined(
     Some(Combination::new(honest, state, built, &direction, how, true))
 }
 
-/// Covariance of all free numbers of the rig but those of lenses, in the order of the parts.
-fn covariance_of_rig(freedom: &Freedom, built: &Built, covariance: &mut Covariance<'_>) -> (Vec<Part>, DMatrix<f64>) {
-    let part = |key: AnyKey, held: &[bool], is_length: &dyn Fn(usize) -> bool| {
-        let free: Vec<usize> = (0..held.len()).filter(|&k| !held[k]).collect();
-        let lengths = free.iter().map(|&k| is_length(k)).collect();
-        Part { key, free, lengths }
-    };
-    let of_pose = |k: usize| k >= 3;
-    let mut parts = vec![
-        part(AnyKey::Pose(built.base), &freedom.base, &of_pose),
-        part(AnyKey::Parameters(built.parameters), &freedom.parameters, &|k| matches!(k % row(1), 1 | 2)),
-    ];
-    for (&(pose, _), held) in built.cameras.iter().zip(&freedom.cameras) {
-        parts.push(part(AnyKey::Pose(pose), held, &of_pose));
-    }
-    for (&feature, held) in built.features.iter().zip(&freedom.features) {
-        parts.push(part(AnyKey::Point(feature), held, &|_| true));
-    }
-    parts.retain(|part| !part.free.is_empty());
-    let firsts: Vec<usize> = parts
-        .iter()
-        .scan(0, |next, part| {
-            let first = *next;
-            *next += part.free.len();
-            Some(first)
-        })
-        .collect();
-    let n = parts.iter().map(|part| part.free.len()).sum();
-    let mut sigma = DMatrix::zeros(n, n);
-    for (a, &row) in parts.iter().zip(&firsts) {
-        for (b, &column) in parts.iter().zip(&firsts).filter(|(_, column)| **column <= row) {
-            let block = a.key.covariance_with(b.key, covariance);
-            for (i, &x) in a.free.iter().enumerate() {
-                for (k, &y) in b.free.iter().enumerate() {
-                    sigma[(row + i, column + k)] = block[(x, y)];
-                    sigma[(column + k, row + i)] = block[(x, y)];
-                }
-            }
-        }
-    }
-    (parts, sigma)
-}
-
 /// Median distance between a camera and what it sees.
 fn distance(honest: &Honest<'_>, state: &State) -> Option<f64> {
     let setup = &honest.setup;
@@ -123,37 +75,4 @@ fn distance(honest: &Honest<'_>, state: &State) -> Option<f64> {
         .map(|seen| state.model.in_camera(seen.camera, seen.feature, &state.links(setup, seen.sample)).norm())
         .collect();
     (!distances.is_empty()).then(|| median(&mut distances))
-}
-
-/// The key of a node of the rig.
-#[derive(Clone, Copy)]
-enum AnyKey {
-    Pose(Key<Pose>),
-    Parameters(Key<DynamicVector>),
-    Point(Key<Vector<3>>),
-}
-
-impl AnyKey {
-    fn index(self) -> usize {
-        match self {
-            AnyKey::Pose(key) => key.index(),
-            AnyKey::Parameters(key) => key.index(),
-            AnyKey::Point(key) => key.index(),
-        }
-    }
-
-    fn covariance_with(self, other: AnyKey, covariance: &mut Covariance<'_>) -> DMatrix<f64> {
-        fn of<A>(a: Key<A>, other: AnyKey, covariance: &mut Covariance<'_>) -> DMatrix<f64> {
-            match other {
-                AnyKey::Pose(b) => covariance.between(a, b),
-                AnyKey::Parameters(b) => covariance.between(a, b),
-                AnyKey::Point(b) => covariance.between(a, b),
-            }
-        }
-        match self {
-            AnyKey::Pose(a) => of(a, other, covariance),
-            AnyKey::Parameters(a) => of(a, other, covariance),
-            AnyKey::Point(a) => of(a, other, covariance),
-        }
-    }
 }

@@ -32,11 +32,7 @@ pub fn read_recordings(paths: &[PathBuf], rig: Option<&RigInput>) -> Result<Reco
 }
 
 /// The same where parameters that match any of `new` may be of cameras that the rig does not have yet.
-pub fn read_recordings_with_new(
-    paths: &[PathBuf],
-    rig: Option<&RigInput>,
-    new: &[String],
-) -> Result<Recording, Error> {
+pub fn read_recordings_with_new(paths: &[PathBuf], rig: Option<&RigInput>, new: &[String]) -> Result<Recording, Error> {
     let recording = Recording::read_all(paths)?;
     if let Some(problem) = rig.and_then(|rig| mismatch(rig, &recording, new)) {
         let file = paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
@@ -57,14 +53,14 @@ fn mismatch(input: &RigInput, recording: &Recording, new: &[String]) -> Option<S
         recording.samples.iter().any(|sample| sample.pixels.iter().any(|detection| detection.camera == index))
     };
     let is_new = |name: &str| new.iter().any(|pattern| matches(pattern, &format!("cameras.{name}.pose")));
-    let is_known = |name: &str| {
-        rig.cameras.is_empty() || rig.cameras.iter().any(|camera| camera.name == name) || is_new(name)
-    };
+    let is_known =
+        |name: &str| rig.cameras.is_empty() || rig.cameras.iter().any(|camera| camera.name == name) || is_new(name);
     let (_, unknown) =
         recording.cameras.iter().enumerate().find(|(index, camera)| !is_known(&camera.name) && is_used(*index))?;
     let known = rig.cameras.iter().map(|camera| camera.name.as_str()).collect::<Vec<_>>().join(", ");
     let name_of_it = &unknown.name;
-    let would_do = if new.is_empty() { String::new() } else { format!("; --relearn cameras.{name_of_it} would add it") };
+    let would_do =
+        if new.is_empty() { String::new() } else { format!("; --relearn cameras.{name_of_it} would add it") };
     Some(format!("camera `{name_of_it}` is not in the rig {name} (known: {known}){would_do}"))
 }
 

@@ -15,6 +15,7 @@ mod noise;
 mod progress;
 mod servo;
 mod simulate;
+mod suggest;
 mod survey;
 mod table;
 mod trust;
@@ -61,6 +62,7 @@ enum Command {
     Evaluate(evaluate::Evaluate),
     Infer(infer::Infer),
     Monitor(monitor::MonitorCommand),
+    Suggest(suggest::Suggest),
     Servo(servo::Servo),
     Experiment(experiment::ExperimentCommand),
     Completions(completions::Completions),
@@ -84,6 +86,7 @@ impl Cli {
             Command::Evaluate(evaluate) => evaluate.run(),
             Command::Infer(infer) => infer.run(),
             Command::Monitor(monitor) => monitor.run(),
+            Command::Suggest(suggest) => suggest.run(),
             Command::Servo(servo) => servo.run(self.json),
             Command::Experiment(experiment) => experiment.run(),
             Command::Completions(completions) => completions.run(),

@@ -225,9 +225,9 @@ pub fn matches(pattern: &str, path: &str) -> bool {
 pub(crate) fn covers(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
-        Some((start, rest)) => name.strip_prefix(start).is_some_and(|end| {
-            end.char_indices().map(|(i, _)| i).chain([end.len()]).any(|i| covers(rest, &end[i..]))
-        }),
+        Some((start, rest)) => name
+            .strip_prefix(start)
+            .is_some_and(|end| end.char_indices().map(|(i, _)| i).chain([end.len()]).any(|i| covers(rest, &end[i..]))),
     }
 }
 

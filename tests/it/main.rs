@@ -26,6 +26,7 @@ mod servo_experiments;
 mod servo_loop;
 mod simulate;
 mod states;
+mod suggest;
 mod targets;
 mod tidy;
 mod uncalibrated;

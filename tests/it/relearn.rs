@@ -138,7 +138,11 @@ fn a_path_that_names_nothing_and_too_few_samples_are_told() {
     assert!(nowhere.contains("`cameras.nowhere` names nothing in the rig or the recording"), "{nowhere}");
     assert!(nowhere.contains("cameras cam1, cam2;"), "{nowhere}");
     let mut header_alone = record(&truth, 5, 6);
-    header_alone.cameras.push(RecordedCamera { name: "top".into(), size: Some([640, 480]), ..RecordedCamera::default() });
+    header_alone.cameras.push(RecordedCamera {
+        name: "top".into(),
+        size: Some([640, 480]),
+        ..RecordedCamera::default()
+    });
     assert_eq!(again(&truth, &header_alone, &["features"]).expect("the header may name more").cameras.len(), 2);
     let unseen = again(&truth, &header_alone, &["cameras.top"]).unwrap_err().to_string();
     assert!(unseen.contains("camera `top` is to be learned, and no sample"), "{unseen}");

@@ -1,0 +1,122 @@
+//! How well the numbers of a rig are known together, and what more detections would make of that.
+use super::super::deviations::Honest;
+use super::super::direction::Direction;
+use super::super::evaluate::median;
+use super::super::gauge;
+use super::super::graph::{Built, Freedom, State};
+use super::super::numbers::Numbers;
+use super::super::outliers::Verdict;
+use crate::Error;
+use handeye_solvers::{Covariance, Solver, WeakDirection};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+/// A Gaussian belief about the free numbers of a rig, and the positions of the tip that it is judged by.
+#[derive(Clone, Debug)]
+pub(super) struct Knowledge {
+    /// Covariance of the numbers; what only priors determine counts as known, for no motion changes it.
+    sigma: DMatrix<f64>,
+    /// Σ M Σ, with M the mean of Jᵀ J over the workspace: tr(M Σ) is the mean variance of the tip.
+    spread: DMatrix<f64>,
+    /// M.
+    mean: DMatrix<f64>,
+    /// J: how the tip moves with the numbers, 3 rows for every position of the workspace.
+    tips: Vec<DMatrix<f64>>,
+}
+
+/// What a fit leaves uncertain.
+pub(super) struct Uncertainty {
+    pub numbers: Numbers,
+    /// Covariance of the numbers.
+    pub sigma: DMatrix<f64>,
+    /// Directions that a prior determines more than the data, each one standard deviation long.
+    pub by_priors: Vec<DVector<f64>>,
+}
+
+impl Uncertainty {
+    /// Of the final problem, with the frames of base and tip held, as calibrate has the deviation of the tip.
+    pub fn new(honest: &Honest<'_>, freedom: &Freedom, state: &State, verdict: &Verdict) -> Result<Self, Error> {
+        let free = &gauge::with_frames_held(&honest.setup, freedom);
+        if !gauge::is_tip_learned(&honest.setup, free) {
+            return Err(Error::Unusable(
+                "the tip does not follow from anything that was learned, for its poses were read or the whole chain was held: there \
+                 is no uncertainty of it that more motions would shrink"
+                    .into(),
+            ));
+        }
+        let is_open = |error| {
+            Error::NotEnoughData(format!(
+                "the recording leaves something of the rig open, so that no motion can be weighed against another ({error}): \\
+                 calibrate says what, and what would help"
+            ))
+        };
+        let built = honest.build(free, state, verdict);
+        let mut solver = Solver::new(&built.graph);
+        let weak = WeakDirection::find(&built.graph, &mut solver, Some(&built.states())).map_err(is_open)?;
+        let mut covariance = Covariance::with(&built.graph, solver).map_err(is_open)?;
+        let numbers = Numbers::new(free);
+        let sigma = numbers.covariance(&built, &mut covariance);
+        let by_priors = weak.iter().filter_map(|weak| of_direction(honest, &built, &numbers, weak)).collect();
+        Ok(Uncertainty { numbers, sigma, by_priors })
+    }
+}
+
+/// A weak direction over the numbers.
+fn of_direction(honest: &Honest<'_>, built: &Built, numbers: &Numbers, weak: &WeakDirection) -> Option<DVector<f64>> {
+    let Direction { parts, sd } = Direction::of_weak(honest, built, weak);
+    let sd = sd?;
+    let mut v = DVector::zeros(numbers.len);
+    for (at, (part, coordinate)) in numbers.iter().enumerate() {
+        let node = part.node(built);
+        let moves = parts.iter().find(|moves| moves.node == node && moves.coordinate == coordinate);
+        v[at] = moves.map_or(0.0, |moves| sd * moves.weight);
+    }
+    Some(v)
+}
+
+impl Knowledge {
+    /// `tips`: how the tip moves with the numbers, at positions of the workspace.
+    pub fn new(uncertainty: &Uncertainty, tips: Vec<DMatrix<f64>>) -> Self {
+        let n = uncertainty.numbers.len;
+        let mut mean = DMatrix::zeros(n, n);
+        tips.iter().for_each(|tip| mean.gemm_tr(1.0 / tips.len() as f64, tip, tip, 1.0));
+        let mut sigma = uncertainty.sigma.clone();
+        uncertainty.by_priors.iter().for_each(|v| sigma.ger(-1.0, v, v, 1.0));
+        let spread = &sigma * &mean * &sigma;
+        Knowledge { sigma, spread, mean, tips }
+    }
+
+    /// Standard deviation of the tip: median over the workspace.
+    pub fn tip(&self) -> f64 {
+        median_deviation(&self.tips, &self.sigma)
+    }
+
+    /// By how much detections would lower the mean variance of the tip: tr(S⁻¹ A Σ M Σ Aᵀ) with S = I + A Σ Aᵀ, for whitened
+    /// detections whose derivatives by the numbers are the rows of A.
+    pub fn gain(&self, rows: &DMatrix<f64>) -> f64 {
+        let Some(innovation) = self.innovation(rows) else { return 0.0 };
+        innovation.solve(&(rows * &self.spread * rows.transpose())).trace()
+    }
+
+    /// Takes detections in: Σ - Σ Aᵀ S⁻¹ A Σ.
+    pub fn learn(&mut self, rows: &DMatrix<f64>) {
+        let Some(innovation) = self.innovation(rows) else { return };
+        let seen = rows * &self.sigma;
+        if let Some(w) = innovation.l().solve_lower_triangular(&seen) {
+            self.sigma.gemm_tr(-1.0, &w, &w, 1.0);
+            self.spread = &self.sigma * &self.mean * &self.sigma;
+        }
+    }
+
+    /// S, factorised.
+    fn innovation(&self, rows: &DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
+        let mut s = rows * &self.sigma * rows.transpose();
+        (0..s.nrows()).for_each(|i| s[(i, i)] += 1.0);
+        s.cholesky()
+    }
+}
+
+/// Root of the trace of the tip's covariance: median over positions.
+pub(super) fn median_deviation(tips: &[DMatrix<f64>], sigma: &DMatrix<f64>) -> f64 {
+    let deviation = |tip: &DMatrix<f64>| (tip * sigma).dot(tip).max(0.0).sqrt();
+    median(&mut tips.iter().map(deviation).collect::<Vec<_>>())
+}

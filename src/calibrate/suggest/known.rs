@@ -1,0 +1,79 @@
+//! What was known before a rig was learned, and where its fit ended.
+use super::super::graph::{Freedom, State, row};
+use super::super::numbers::{Numbers, Part};
+use super::super::setup::Setup;
+use crate::Error;
+use crate::rig::{CameraField, Fit, JointField, Model, Parameter, Rig};
+use std::collections::BTreeSet;
+
+/// The rig without what it learned: names, limits, parents and models stay, and the values that `[estimate]` speaks of.
+pub(super) fn held_alone(learned: &Rig) -> Rig {
+    let mut known = Rig { fit: None, ..learned.clone() };
+    for parameter in learned.parameters() {
+        if !learned.is_fixed(&parameter) && learned.prior_sd(&parameter).is_none() {
+            known.forget(&parameter);
+        }
+    }
+    known
+}
+
+/// The state in which the fit ended, at the learned values.
+pub(super) fn start(setup: &Setup, learned: &Rig) -> Result<State, Error> {
+    let mut rig = setup.rig.clone();
+    let names = |rig: &Rig| rig.robot.joints.iter().map(|joint| (joint.name.clone(), joint.kind)).collect::<Vec<_>>();
+    if names(&rig) != names(learned) || rig.robot.convention != learned.robot.convention {
+        return Err(Error::Unusable("the learned rig and what was known of it have other joints".into()));
+    }
+    rig.robot = learned.robot.clone();
+    let lacks = |what: &str, name: &str| {
+        Error::Unusable(format!(
+            "the learned rig has no {what} `{name}`, which the recording has: it was learned from another one"
+        ))
+    };
+    for camera in &mut rig.cameras {
+        let found = learned.cameras.iter().find(|learned| learned.name == camera.name);
+        *camera = found.ok_or_else(|| lacks("camera", &camera.name))?.clone();
+    }
+    for feature in &mut rig.features {
+        let found = learned.features.iter().find(|learned| learned.name == feature.name);
+        *feature = found.ok_or_else(|| lacks("feature", &feature.name))?.clone();
+    }
+    let mut state = State::new(setup);
+    state.model = Model::new(&rig)?;
+    Ok(state)
+}
+
+/// What is free now must be what was free when the rig was learned, which is what has a standard deviation.
+pub(super) fn check_freedom(setup: &Setup, freedom: &Freedom, fit: &Fit) -> Result<(), Error> {
+    if fit.sd.is_empty() {
+        return Err(Error::NotEnoughData(
+            "the rig has no standard deviations in [fit.sd]: what it was learned from leaves something open, which `gauge` names"
+                .into(),
+        ));
+    }
+    let path = |(part, k): (Part, usize)| {
+        let parameter = match part {
+            Part::Base => Parameter::Base,
+            Part::Chain => Parameter::JointField { joint: k / row(1), field: JointField::ALL[k % row(1)] },
+            Part::Camera(camera) => Parameter::CameraPose(camera),
+            Part::Lens(camera) => Parameter::CameraField { camera, field: CameraField::ALL[k.min(4)] },
+            Part::Feature(feature) => Parameter::FeatureXyz(feature),
+        };
+        parameter.path(&setup.rig)
+    };
+    let now: BTreeSet<String> = Numbers::new(freedom).iter().map(path).collect();
+    let then: BTreeSet<String> = fit.sd.keys().cloned().collect();
+    match now.symmetric_difference(&then).next() {
+        None => Ok(()),
+        Some(path) => {
+            let problem = if then.contains(path) {
+                "was free when the rig was learned, and is held where nothing is known beforehand: give the rig that learning \
+                 started from (--rig)"
+            } else {
+                "was held when the rig was learned, and is free where nothing is known beforehand: give the rig that learning \
+                 started from (--rig), or calibrate all of it again where only a part was relearned"
+            };
+            Err(Error::Unusable(format!("`{path}` {problem}")))
+        }
+    }
+}

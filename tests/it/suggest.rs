@@ -1,0 +1,248 @@
+//! Joint positions that are suggested are worth more than random ones, and buy what is said.
+use crate::cli::Folder;
+use crate::learning::{learn, nothing, record, variants};
+use handeye::Error;
+use handeye::calibrate::{Calibration, SuggestOptions, Suggestion, suggest};
+use handeye::chain::JointKind;
+use handeye::recording::Recording;
+use handeye::rig::{Limits, Model, Rig};
+use handeye::simulate::random_rig;
+use serde_json::Value;
+use visits::{gauge_alone, in_view, tip_error, visit};
+
+#[path = "../../benches/common/visits.rs"]
+mod visits;
+
+const SEEDS: u64 = 20;
+
+fn ask(learned: &Rig, recording: Option<&Recording>, known: Option<&Rig>, count: usize) -> Result<Suggestion, Error> {
+    suggest(learned, recording, known, &SuggestOptions { count, ..SuggestOptions::default() })
+}
+
+fn tip(calibration: &Calibration) -> f64 {
+    calibration.report.tip.unwrap().by_data
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Against the truth: ten random samples, and five more, suggested or random.
+#[test]
+fn five_suggested_positions_bring_the_tip_nearer_to_the_truth_than_five_random_ones() {
+    let (mut ratios, mut said) = (Vec::new(), Vec::new());
+    for seed in 1..=SEEDS {
+        let truth = random_rig(6, 2, 12, seed);
+        let (start, ten) = (gauge_alone(&truth), record(&truth, 10, seed));
+        let learned = learn(&start, &ten).unwrap().rig;
+        let found = ask(&learned, Some(&ten), Some(&start), 5).unwrap();
+        let with_suggested = learn(&start, &visit(&truth, &ten, &found, seed)).unwrap();
+        let with_random = learn(&start, &record(&truth, 15, seed)).unwrap();
+        let [suggested, random] = [&with_suggested, &with_random].map(|one| tip_error(&one.rig, &truth, seed));
+        println!(
+            "{seed}: now {:.3} mm, suggested {:.3} mm, random {:.3} mm; {:.3} mm said",
+            1e3 * tip_error(&learned, &truth, seed),
+            1e3 * suggested,
+            1e3 * random,
+            1e3 * found.samples[4].tip
+        );
+        ratios.push(suggested / random);
+        said.push((suggested / found.samples[4].tip).powi(2));
+    }
+    let (ratio, said) = (median(ratios), (said.iter().sum::<f64>() / said.len() as f64).sqrt());
+    println!("suggested over random {ratio:.3}, true error over what is said {said:.3}");
+    assert!(ratio < 0.8, "{ratio:.3} of the error with random ones in the median");
+}
+
+/// From nothing: what is expected of the suggested positions is what calibrate then reports, and more than of random ones.
+#[test]
+fn suggested_positions_buy_what_is_said() {
+    let (mut bought, mut random_said, mut now) = (Vec::new(), Vec::new(), Vec::new());
+    for seed in 1..=SEEDS {
+        let truth = random_rig(6, 2, 12, seed);
+        let ten = record(&truth, 10, seed);
+        let learned = learn(&nothing(&truth), &ten).unwrap();
+        let found = ask(&learned.rig, Some(&ten), None, 5).unwrap();
+        assert!(!found.metric && !found.stood_in && found.learned_from == 10);
+        let fifteen = visit(&truth, &ten, &found, seed);
+        let then = learn(&nothing(&truth), &fifteen).unwrap();
+        let random = learn(&nothing(&truth), &record(&truth, 15, seed)).unwrap();
+        // Over the same workspace, the deviation is that expected; over the recorded samples, nearly so.
+        let again = ask(&then.rig, Some(&fifteen), None, 1).unwrap();
+        let last = &found.samples[4];
+        assert!(
+            (again.now / last.tip - 1.0).abs() < 0.1,
+            "seed {seed}: {:.2e} expected, {:.2e} then",
+            last.tip,
+            again.now
+        );
+        assert!(
+            (tip(&then) / last.tip - 1.0).abs() < 0.25,
+            "seed {seed}: {:.2e} expected, {:.2e} reported",
+            last.tip,
+            tip(&then)
+        );
+        assert!(found.samples.windows(2).all(|pair| pair[1].tip < pair[0].tip) && found.samples[0].tip < found.now);
+        now.push(found.now / tip(&learned));
+        random_said.push(tip(&random) / last.tip_random);
+        bought.push(tip(&then) / tip(&random));
+    }
+    let [bought, random_said, now] = [bought, random_said, now].map(median);
+    println!("suggested over random {bought:.3}; reported over expected: now {now:.3}, random {random_said:.3}");
+    assert!(bought < 0.75, "{bought:.3} of the deviation with random ones in the median");
+    assert!((now - 1.0).abs() < 0.1 && (random_said - 1.0).abs() < 0.15, "{now:.3} {random_said:.3}");
+}
+
+#[test]
+fn without_the_recording_positions_are_ranked_nearly_as_well() {
+    let (mut bought, mut said) = (Vec::new(), Vec::new());
+    for seed in 1..=10 {
+        let truth = random_rig(6, 2, 12, seed);
+        let ten = record(&truth, 10, seed);
+        let learned = learn(&nothing(&truth), &ten).unwrap();
+        let found = ask(&learned.rig, None, None, 5).unwrap();
+        assert!(found.stood_in);
+        let then = learn(&nothing(&truth), &visit(&truth, &ten, &found, seed)).unwrap();
+        let random = learn(&nothing(&truth), &record(&truth, 15, seed)).unwrap();
+        bought.push(tip(&then) / tip(&random));
+        said.push(tip(&then) / found.samples[4].tip);
+    }
+    let (bought, said) = (median(bought), median(said));
+    println!("suggested without the recording over random {bought:.3}, reported over expected {said:.3}");
+    assert!(bought < 0.9, "{bought:.3} of the deviation with random ones in the median");
+    assert!((0.6..1.6).contains(&said), "{said:.3} of what is said");
+}
+
+/// Of which nothing is known but the kinds of the joints, their limits, and what is fixed to what.
+fn limits_known(truth: &Rig) -> Rig {
+    let mut rig = variants::forgotten(truth);
+    rig.robot.joints = truth.robot.joints.clone();
+    for joint in &mut rig.robot.joints {
+        (joint.offset, joint.d, joint.a, joint.alpha, joint.beta) = (None, None, None, None, None);
+    }
+    rig
+}
+
+#[test]
+fn every_kind_of_rig_gets_what_is_said_inside_its_limits_and_in_view() {
+    let mut noisy = random_rig(6, 2, 12, 5);
+    noisy.noise.joints = 0.003;
+    let cases = [
+        ("cameras on the hand", variants::on_hand(2, 5), 20),
+        ("a sliding joint", variants::prismatic(5), 20),
+        ("modified DH", variants::modified(5), 20),
+        ("features on links", variants::on_links(5), 20),
+        ("parallel axes", variants::ur5(5), 20),
+        ("noisy joints", noisy, 25),
+    ];
+    for (name, truth, samples) in cases {
+        for (start, known) in [(limits_known(&truth), false), (variants::nominal(&truth), true)] {
+            let before = record(&truth, samples, 5);
+            let learned = learn(&start, &before).unwrap().rig;
+            let found = ask(&learned, Some(&before), known.then_some(&start), 4).unwrap();
+            let model = Model::new(&learned).unwrap();
+            for sample in &found.samples {
+                for (value, joint) in sample.joints.iter().zip(&truth.robot.joints) {
+                    let (lower, upper) = (joint.limits.lower.unwrap(), joint.limits.upper.unwrap());
+                    assert!((lower..=upper).contains(value), "{name}: {value} beyond {lower} to {upper}");
+                }
+                let seen = in_view(&model, &learned, &sample.joints);
+                assert_eq!(seen.len(), sample.in_view, "{name}");
+                let of_camera = |camera: usize| seen.iter().filter(|one| one.0 == camera).count();
+                let most = (0..truth.cameras.len()).map(of_camera).max().unwrap();
+                assert!(2 * most >= truth.features.len(), "{name}: {most} features in view");
+            }
+            let more = visit(&truth, &before, &found, 5);
+            let then = learn(&start, &more).unwrap().rig;
+            let then = ask(&then, Some(&more), known.then_some(&start), 1).unwrap().now;
+            let [expected, random] = [found.samples[3].tip, found.samples[3].tip_random];
+            println!(
+                "{name}, {known}: now {:.2e}, expected {expected:.2e}, random {random:.2e}, then {then:.2e}",
+                found.now
+            );
+            assert!((then / expected - 1.0).abs() < 0.2, "{name}: {expected:.2e} expected, {then:.2e} then");
+            assert!(expected < random, "{name}: {expected:.2e} with suggested ones, {random:.2e} with random ones");
+        }
+    }
+}
+
+#[test]
+fn without_limits_joints_stay_where_they_were_while_the_rig_was_learned() {
+    let truth = random_rig(6, 2, 12, 3);
+    let recording = record(&truth, 20, 3);
+    let learned = learn(&nothing(&truth), &recording).unwrap().rig;
+    let ranges = &learned.fit.as_ref().unwrap().joints;
+    for sample in ask(&learned, Some(&recording), None, 5).unwrap().samples {
+        for (value, [least, most]) in sample.joints.iter().zip(ranges) {
+            assert!((least..=most).contains(&value), "{value} outside {least} to {most}");
+        }
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_positions_on_any_number_of_threads() {
+    let truth = random_rig(6, 2, 12, 4);
+    let recording = record(&truth, 15, 4);
+    let learned = learn(&nothing(&truth), &recording).unwrap().rig;
+    let on = |threads, seed| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| suggest(&learned, Some(&recording), None, &SuggestOptions { count: 3, seed }).unwrap())
+    };
+    assert_eq!(on(1, 7), on(3, 7));
+    assert_ne!(on(1, 7).samples, on(1, 8).samples);
+}
+
+#[test]
+fn what_cannot_be_weighed_is_refused_with_the_reason() {
+    let truth = random_rig(6, 2, 12, 6);
+    let recording = record(&truth, 15, 6);
+    let learned = learn(&nothing(&truth), &recording).unwrap().rig;
+    let told = |learned: &Rig, recording: &Recording, known: Option<&Rig>, count| {
+        ask(learned, Some(recording), known, count).unwrap_err().to_string()
+    };
+    assert!(told(&learned, &recording, None, 0).contains("0 joint positions"));
+    assert!(told(&truth, &recording, None, 3).contains("has no [fit]"));
+    let started = learn(&truth, &recording).unwrap().rig;
+    let unknown_start = told(&started, &recording, None, 3);
+    assert!(unknown_start.contains("`robot.base` was free when the rig was learned"), "{unknown_start}");
+    assert!(ask(&started, Some(&recording), Some(&truth), 1).is_ok());
+    let mut chain_held = truth.clone();
+    chain_held.estimate.fixed = vec!["robot".into()];
+    let no_tip = told(&learn(&chain_held, &recording).unwrap().rig, &recording, Some(&chain_held), 3);
+    assert!(no_tip.contains("the tip does not follow from anything that was learned"), "{no_tip}");
+    let mut other = recording.clone();
+    other.features[3] = "elsewhere".into();
+    let other = told(&learned, &other, None, 3);
+    assert!(other.contains("no feature `elsewhere`"), "{other}");
+    let mut slides = variants::prismatic(6);
+    let of_slides = record(&slides, 20, 6);
+    slides = learn(&limits_known(&slides), &of_slides).unwrap().rig;
+    slides.robot.joints[2].limits = Limits::default();
+    slides.fit.as_mut().unwrap().joints.clear();
+    let endless = told(&slides, &of_slides, None, 3);
+    assert!(slides.robot.joints[2].kind == JointKind::Prismatic && endless.contains("`j3` is prismatic"), "{endless}");
+}
+
+#[test]
+fn the_command_lists_positions_writes_them_for_the_robot_and_says_what_they_buy() {
+    let folder = Folder::new("suggest");
+    folder.expect(0, "simulate ur5 --samples 12 --seed 3 -o motions.jsonl");
+    folder.expect(0, "calibrate motions.jsonl -o learned.toml");
+    let (text, _) = folder.expect(0, "suggest learned.toml --count 2 --with motions.jsonl -o next.jsonl");
+    for word in ["2 joint positions", "wrist_3", "°)", "in view", "as many random ones", "next.jsonl"] {
+        assert!(text.contains(word), "{word}: {text}");
+    }
+    let to_visit = Recording::read(&folder.path().join("next.jsonl")).unwrap();
+    assert_eq!((to_visit.samples.len(), to_visit.joints.len(), to_visit.cameras.len()), (2, 6, 2));
+    let (json, _) = folder.expect(0, "suggest learned.toml --count 2 --with motions.jsonl --json");
+    let json: Value = serde_json::from_str(&json).unwrap();
+    let joints: Vec<f64> =
+        json["samples"][1]["joints"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
+    assert_eq!(Some(&joints), to_visit.samples[1].joints.as_ref());
+    assert!(json["samples"][1]["tip_sd"].as_f64() < json["tip_sd"].as_f64() && json["stood_in"] == false);
+    let (ranking, _) = folder.expect(0, "suggest learned.toml --count 1");
+    assert!(ranking.contains("a ranking more than a prediction") && ranking.contains("--with"), "{ranking}");
+    let (_, refused) = folder.expect(2, "suggest learned.toml --with motions.jsonl -o motions.jsonl");
+    assert!(refused.contains("is an input too"), "{refused}");
+}
