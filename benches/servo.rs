@@ -6,11 +6,10 @@ use handeye::calibrate::{Options, calibrate};
 use handeye::infer::Sighting;
 use handeye::recording::{Detection, RecordedCamera, Recording, Sample};
 use handeye::rig::{Camera, Feature, Rig};
-use handeye::servo::{Arm, Configuration, ModelBased};
+use handeye::servo::{Arm, ModelBased};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, Normal};
-use servo_cases::Cases;
+use servo_cases::{Cases, mean, mean_error, normal};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
@@ -42,28 +41,8 @@ fn main() {
 }
 
 fn row(name: &str, cases: &Cases, rig: &Rig, noise: f64) {
-    let arm = Arm::new(&cases.rig).expect("complete");
     let mut servo = ModelBased::new(rig).expect("complete");
-    let random = &mut ChaCha8Rng::seed_from_u64(1);
-    let mut errors = vec![Vec::new(); COMMANDS + 1];
-    for (start, target) in &cases.pairs {
-        let goal = look(&arm, cases, target);
-        servo.aim(&goal);
-        let mut joints = start.clone();
-        for (command, errors) in errors.iter_mut().enumerate() {
-            let seen = look(&arm, cases, &joints);
-            errors.push(mean_error(&seen, &goal));
-            if command < COMMANDS {
-                let read: Vec<f64> = joints.iter().map(|joint| joint + normal(noise, random)).collect();
-                let step = servo.step(&seen, &read, &[], 1.0).expect("the features are seen");
-                joints
-                    .iter_mut()
-                    .zip(&step.motion)
-                    .for_each(|(joint, motion)| *joint += motion + normal(noise, random));
-            }
-        }
-    }
-    let mean = |errors: &Vec<f64>| errors.iter().sum::<f64>() / errors.len() as f64;
+    let errors = cases.errors(&mut servo, COMMANDS, noise, 1);
     let means: Vec<String> = errors.iter().map(|errors| format!("{:8.3}", mean(errors))).collect();
     println!("{name:28} {} {:12.3}", means.join(" "), errors[2].iter().copied().fold(0.0, f64::max));
 }
@@ -74,10 +53,10 @@ fn floor(set: &str, cases: &Cases) {
     let random = &mut ChaCha8Rng::seed_from_u64(2);
     let (mut sum, mut count) = (0.0, 0.0);
     for (_, target) in &cases.pairs {
-        let goal = look(&arm, cases, target);
+        let goal = cases.look(&arm, target);
         for _ in 0..50 {
             let joints: Vec<f64> = target.iter().map(|joint| joint + normal(NOISY, random)).collect();
-            sum += mean_error(&look(&arm, cases, &joints), &goal);
+            sum += mean_error(&cases.look(&arm, &joints), &goal);
             count += 1.0;
         }
     }
@@ -105,7 +84,7 @@ fn learn(cases: &Cases) -> Result<Rig, handeye::Error> {
     };
     for (start, _) in cases.pairs.iter().take(50) {
         let joints: Vec<f64> = start.iter().map(|joint| joint + random.random_range(-0.3..0.3)).collect();
-        let seen = look(&arm, cases, &joints);
+        let seen = cases.look(&arm, &joints);
         let detection = |seen: &Sighting| Detection {
             camera: seen.camera as u32,
             feature: seen.feature as u32,
@@ -124,23 +103,4 @@ fn learn(cases: &Cases) -> Result<Rig, handeye::Error> {
     }));
     rig.features.extend(cases.rig.features.iter().map(|feature| Feature { xyz: None, ..feature.clone() }));
     Ok(calibrate(&rig, &recording, &Options::default(), &mut |_| ControlFlow::Continue(()))?.rig)
-}
-
-fn look(arm: &Arm, cases: &Cases, joints: &[f64]) -> Vec<Sighting> {
-    let mut at = Configuration::default();
-    arm.configure(joints, &mut at);
-    let features = cases.rig.features.len();
-    let all = (0..cases.rig.cameras.len()).flat_map(|camera| (0..features).map(move |feature| (camera, feature)));
-    let see =
-        |(camera, feature)| Sighting { camera, feature, pixel: arm.pixel(&at, camera, feature).expect("of the rig") };
-    all.map(see).collect()
-}
-
-fn mean_error(seen: &[Sighting], goal: &[Sighting]) -> f64 {
-    let distance = |(a, b): (&Sighting, &Sighting)| (a.pixel[0] - b.pixel[0]).hypot(a.pixel[1] - b.pixel[1]);
-    seen.iter().zip(goal).map(distance).sum::<f64>() / seen.len() as f64
-}
-
-fn normal(sd: f64, random: &mut ChaCha8Rng) -> f64 {
-    Normal::new(0.0, sd).expect("finite").sample(random)
 }

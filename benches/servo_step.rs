@@ -6,7 +6,7 @@ use handeye::infer::Sighting;
 use handeye::rig::Rig;
 use handeye::servo::limits::InImage;
 use handeye::servo::tasks::ImagePoints;
-use handeye::servo::{Arm, Configuration, Goal, Limit, Stepper};
+use handeye::servo::{Arm, Configuration, Goal, ImageBased, ImageSettings, Limit, Stepper};
 use handeye::simulate::{SimulateOptions, random_rig, simulate};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -40,6 +40,7 @@ fn main() {
     row("no limit active", f64::INFINITY, false, "3");
     row("joint speeds active, through Clarabel", 0.05, false, "35");
     row("and 24 rows of visibility, through Clarabel", 0.05, true, "120");
+    image_based("ImageBased, mean matrix, no limit active");
 }
 
 fn row(name: &str, speed: f64, visible: bool, required: &str) {
@@ -60,12 +61,41 @@ fn row(name: &str, speed: f64, visible: bool, required: &str) {
     let limits: &[&dyn Limit] = if visible { &[&image] } else { &[] };
     let goals = [Goal::new(&task)];
     let mut stepper = Stepper::default();
-    let (mut times, mut asked) = (Vec::new(), 0);
-    for joints in &places[..STEPS] {
-        let before = (ASKED.load(Ordering::Relaxed), ThreadTime::now());
+    timed(name, required, |index| {
+        arm.configure(&places[index], &mut at);
+        assert!(!stepper.step(&arm, &at, &goals, limits, 1.0).failed);
+    });
+}
+
+/// The same error, measured in place of predicted, with slopes of two configurations.
+fn image_based(name: &str) {
+    let mut rig = random_rig(6, 2, 12, 3);
+    let places = positions(&rig, STEPS + 1);
+    for joint in &mut rig.robot.joints {
+        (joint.limits.lower, joint.limits.upper) = (Some(-50.0), Some(50.0));
+    }
+    let arm = Arm::new(&rig).expect("complete");
+    let look = |joints: &[f64]| -> Vec<Sighting> {
+        let mut at = Configuration::default();
         arm.configure(joints, &mut at);
-        let step = stepper.step(&arm, &at, &goals, limits, 1.0);
+        let pairs = (0..2).flat_map(|camera| (0..12).map(move |feature| (camera, feature)));
+        let see = |(camera, feature)| Some(Sighting { camera, feature, pixel: arm.pixel(&at, camera, feature)? });
+        pairs.filter_map(see).collect()
+    };
+    let seen: Vec<Vec<Sighting>> = places.iter().map(|joints| look(joints)).collect();
+    let mut servo = ImageBased::new(&rig, ImageSettings::default()).expect("complete");
+    servo.aim(&seen[STEPS]);
+    timed(name, "-", |index| {
+        let step = servo.step(&seen[index], &places[index], &[], 100.0).expect("the features are seen");
         assert!(!step.failed);
+    });
+}
+
+fn timed(name: &str, required: &str, mut step: impl FnMut(usize)) {
+    let (mut times, mut asked) = (Vec::new(), 0);
+    for index in 0..STEPS {
+        let before = (ASKED.load(Ordering::Relaxed), ThreadTime::now());
+        step(index);
         let (elapsed, now) = (before.1.elapsed(), ASKED.load(Ordering::Relaxed));
         // All but the first few.
         asked = asked.max(if times.len() > 10 { now - before.0 } else { 0 });

@@ -1,7 +1,12 @@
 //! The servoing problems that ViSP was measured on, as rigs: `cases/servo_ur5.json`.
+use handeye::infer::Sighting;
 use handeye::rig::{Camera, Feature, Limits, Parent, Rig};
+use handeye::servo::{Arm, Command, Configuration, Controller, Measurement};
 use handeye::solvers::Pose;
 use nalgebra::{Matrix3, Vector3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
 use serde_json::Value;
 
 #[path = "dh_rows.rs"]
@@ -50,6 +55,69 @@ impl Cases {
         let pairs = list(&all["sets"][set]["cases"]).iter().map(pair).collect();
         Cases { rig, pairs }
     }
+
+    /// What all cameras see of all features, in the image or not. `arm`: of the rig.
+    pub fn look(&self, arm: &Arm, joints: &[f64]) -> Vec<Sighting> {
+        let mut at = Configuration::default();
+        arm.configure(joints, &mut at);
+        let features = self.rig.features.len();
+        let all = (0..self.rig.cameras.len()).flat_map(|camera| (0..features).map(move |feature| (camera, feature)));
+        let see = |(camera, feature)| Sighting {
+            camera,
+            feature,
+            pixel: arm.pixel(&at, camera, feature).expect("of the rig"),
+        };
+        all.map(see).collect()
+    }
+
+    /// Mean pixel errors [px] after 0, 1, .. commands, of every pair in turn, several times over. `noise`: of joint readings and of
+    /// motions [rad]. A loop that loses its features, or is farther from its goal than [`LOST`], stands still there.
+    pub fn errors(&self, servo: &mut dyn Controller, commands: usize, noise: f64, times: usize) -> Vec<Vec<f64>> {
+        let arm = Arm::new(&self.rig).expect("complete");
+        let random = &mut ChaCha8Rng::seed_from_u64(1);
+        let mut errors = vec![Vec::new(); commands + 1];
+        for (start, target) in self.pairs.iter().cycle().take(times * self.pairs.len()) {
+            let goal = self.look(&arm, target);
+            servo.aim(&goal);
+            let mut joints = start.clone();
+            let mut lost = false;
+            for (command, errors) in errors.iter_mut().enumerate() {
+                let seen = self.look(&arm, &joints);
+                let error = mean_error(&seen, &goal);
+                lost |= error.is_nan() || error > LOST;
+                errors.push(if lost { LOST } else { error });
+                if command == commands || lost {
+                    continue;
+                }
+                let read: Vec<f64> = joints.iter().map(|joint| joint + normal(noise, random)).collect();
+                let now = Measurement { time: command as f64, joints: &read, seen: &seen };
+                let Ok(Command::JointDelta(motion)) = servo.decide(&now, &[], 1.0).map(|decision| decision.command)
+                else {
+                    lost = true;
+                    continue;
+                };
+                joints.iter_mut().zip(motion).for_each(|(joint, motion)| *joint += motion + normal(noise, random));
+            }
+        }
+        errors
+    }
+}
+
+/// Farther from its goal than this a loop counts as lost, with this error [px]: so it was for ViSP.
+const LOST: f64 = 1000.0;
+
+pub fn mean(numbers: &[f64]) -> f64 {
+    numbers.iter().sum::<f64>() / numbers.len() as f64
+}
+
+pub fn normal(sd: f64, random: &mut ChaCha8Rng) -> f64 {
+    Normal::new(0.0, sd).expect("finite").sample(random)
+}
+
+/// Mean distance of pixels that are listed in the same order [px].
+pub fn mean_error(seen: &[Sighting], goal: &[Sighting]) -> f64 {
+    let distance = |(a, b): (&Sighting, &Sighting)| (a.pixel[0] - b.pixel[0]).hypot(a.pixel[1] - b.pixel[1]);
+    seen.iter().zip(goal).map(distance).sum::<f64>() / seen.len() as f64
 }
 
 fn list(value: &Value) -> &[Value] {

@@ -17,7 +17,7 @@ mod starts;
 mod tip;
 mod views;
 
-pub(crate) use views::Views;
+pub(crate) use views::{Glance, Views};
 
 pub use branch::Branch;
 pub use history::Moment;

@@ -80,11 +80,23 @@ impl Views {
         (camera.min(feature), camera.max(feature))
     }
 
+    /// The point in the camera frame that is seen at a pixel, `depth` in front of the camera [m]; `None` where none is.
+    pub fn at_depth(&self, sighting: &Sighting, depth: f64) -> Option<Vector3<f64>> {
+        let camera = &self.cameras[sighting.camera];
+        let ray = camera.model.unproject(&camera.intrinsics, sighting.pixel)?;
+        (ray.z > 0.0).then(|| ray * (depth / ray.z))
+    }
+
     /// `feature_frame`, `world_from_camera`: where the feature's parent and the camera are in the world.
     #[inline]
     pub fn glance(&self, sighting: &Sighting, feature_frame: Option<&Pose>, world_from_camera: &Pose) -> Glance {
         let xyz = &self.features[sighting.feature].xyz;
-        let point = feature_frame.map_or(*xyz, |frame| frame.transform(xyz));
+        self.glance_at(sighting, feature_frame.map_or(*xyz, |frame| frame.transform(xyz)), world_from_camera)
+    }
+
+    /// The same where the feature is at `point` in the world [m].
+    #[inline]
+    pub fn glance_at(&self, sighting: &Sighting, point: Vector3<f64>, world_from_camera: &Pose) -> Glance {
         let camera = &self.cameras[sighting.camera];
         let in_camera = so3::apply_transposed(&world_from_camera.rotation, &(point - world_from_camera.translation));
         let (pixel, slopes) = camera.model.linearize(&camera.intrinsics, &in_camera);

@@ -2,6 +2,7 @@
 mod catalog;
 mod plot;
 mod read;
+mod read_control;
 mod run;
 
 pub use catalog::ALL;
@@ -9,7 +10,7 @@ pub use plot::svg;
 pub use run::{Moment, Run, run};
 
 use crate::rig::Rig;
-use crate::servo::{LoopSettings, Takes};
+use crate::servo::{ImageSettings, LoopSettings, PoseSettings, Takes};
 use crate::simulate::world::WorldOptions;
 use nalgebra::Vector3;
 
@@ -68,6 +69,10 @@ pub enum Control {
         /// Largest speed of its origin and of its turning; infinite for none.
         speed: [f64; 2],
     },
+    /// [`crate::servo::ImageBased`].
+    ImageBased(ImageSettings),
+    /// [`crate::servo::PoseBased`].
+    PoseBased(PoseSettings),
 }
 
 /// A limit of a scene.

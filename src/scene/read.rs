@@ -1,4 +1,5 @@
 //! Reading scene files, with a place for every mistake.
+use super::read_control::read_control;
 use super::{Control, LimitKind, Scene, Target};
 use crate::Error;
 use crate::rig::read::document::{Fields, Node, Source, parse};
@@ -66,8 +67,8 @@ impl Scene {
                 velocity: target.optional("velocity", Node::any_numbers)?.unwrap_or_default(),
                 until: target.optional("until", Node::not_negative)?.unwrap_or(f64::INFINITY),
             },
-            control: match section("controller", &["kind", "speed"])? {
-                Some(fields) => read_control(&fields)?,
+            control: match root.field("controller") {
+                Some(field) => read_control(field.value)?,
                 None => Control::ModelBased,
             },
             limits: match root.field("limits") {
@@ -155,17 +156,6 @@ fn read_tracker(fields: &Fields) -> Result<(Tracker, f64), Error> {
         }
     })?;
     Ok((tracker, missed.unwrap_or(0.0)))
-}
-
-fn read_control(fields: &Fields) -> Result<Control, Error> {
-    let kind =
-        fields.optional("kind", |node| node.word("controller", &["model-based", "model-based-tip"], |name| name))?;
-    let speed = fields.optional("speed", |node| node.numbers::<2>())?;
-    match (kind, speed) {
-        (Some("model-based-tip"), speed) => Ok(Control::ModelBasedTip { speed: speed.unwrap_or([f64::INFINITY; 2]) }),
-        (_, None) => Ok(Control::ModelBased),
-        (_, Some(_)) => Err(fields.error("`speed` ([m/s, rad/s]) is for model-based-tip; others take [limits]")),
-    }
 }
 
 fn read_limits(node: Node) -> Result<Vec<(String, LimitKind)>, Error> {

@@ -6,7 +6,8 @@ use crate::recording::{Detection, Recording, Sample};
 use crate::rig::Rig;
 use crate::servo::limits::{HalfSpace, InImage, PixelSpeed, TipSpeed};
 use crate::servo::{
-    Active, Command, Controller, Limit, LoopSettings, Measurement, ModelBased, ModelBasedTip, ServoLoop, Stop, Takes,
+    Active, Command, Controller, ImageBased, Limit, LoopSettings, Measurement, ModelBased, ModelBasedTip, PoseBased,
+    ServoLoop, Stop, Takes,
 };
 use crate::simulate::world::World;
 use std::ops::ControlFlow;
@@ -68,6 +69,16 @@ pub fn run(known: &Rig, scene: &Scene, watch: &mut dyn FnMut(&Moment) -> Control
                     scene.takes.name()
                 )));
             }
+            run_with(controller, known, scene, watch)
+        }
+        Control::ImageBased(settings) => {
+            let mut controller = ImageBased::new(known, settings.clone())?;
+            controller.takes = scene.takes;
+            run_with(controller, known, scene, watch)
+        }
+        Control::PoseBased(settings) => {
+            let mut controller = PoseBased::new(known, settings.clone())?;
+            controller.takes = scene.takes;
             run_with(controller, known, scene, watch)
         }
     }

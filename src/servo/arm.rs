@@ -1,7 +1,7 @@
 //! A complete rig prepared for control loops, and where it is at a moment.
 use crate::Error;
 use crate::chain::{Axis, JointChain, Posture};
-use crate::infer::{Sighting, Views};
+use crate::infer::{Glance, Sighting, Views};
 use crate::rig::{Limits, Model, Rig};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
@@ -80,6 +80,18 @@ impl Arm {
         self.sizes.get(camera).copied().flatten()
     }
 
+    /// Fails where readings are not of this arm or not finite.
+    pub(super) fn check(&self, joints: &[f64]) -> Result<(), Error> {
+        let (found, n) = (joints.len(), self.joints());
+        if found != n {
+            return Err(Error::Unusable(format!("{found} joint readings; the rig has {n} joints")));
+        }
+        let odd = joints.iter().position(|joint| !joint.is_finite());
+        odd.map_or(Ok(()), |i| {
+            Err(Error::Unusable(format!("joint reading {} is {}, not a finite number", i + 1, joints[i])))
+        })
+    }
+
     /// Moves a configuration to these joints, one reading each [rad or m]; its velocity stays, and is 0 at first.
     pub fn configure(&self, joints: &[f64], at: &mut Configuration) {
         at.joints.clear();
@@ -96,21 +108,43 @@ impl Arm {
 
     /// Where a camera sees a feature, and how that changes with the joints. `None` where camera or feature are not of the rig.
     pub fn sight<'a>(&self, at: &'a Configuration, sighting: &Sighting) -> Option<Sight<'a>> {
-        if !self.views.knows(sighting) {
+        self.views.knows(sighting).then(|| {
+            let depth = self.views.features[sighting.feature].depth;
+            let frame = (depth > 0).then(|| &at.posture.links[depth]);
+            self.follow(at, sighting, self.views.glance(sighting, frame, &at.cameras[sighting.camera]))
+        })
+    }
+
+    /// The same for a feature that is where its pixel says, `depth` in front of the camera [m], and not where the rig has it. `None` also
+    /// where nothing in front of the camera is seen at that pixel.
+    pub fn sight_at_depth<'a>(&self, at: &'a Configuration, seen: &Sighting, depth: f64) -> Option<Sight<'a>> {
+        if !self.views.knows(seen) {
             return None;
         }
-        let depth = self.views.features[sighting.feature].depth;
-        let frame = (depth > 0).then(|| &at.posture.links[depth]);
-        let glance = self.views.glance(sighting, frame, &at.cameras[sighting.camera]);
+        let world_from_camera = &at.cameras[seen.camera];
+        let point = world_from_camera.transform(&self.views.at_depth(seen, depth)?);
+        Some(self.follow(at, seen, self.views.glance_at(seen, point, world_from_camera)))
+    }
+
+    fn follow<'a>(&self, at: &'a Configuration, sighting: &Sighting, glance: Glance) -> Sight<'a> {
         let (from, to) = self.views.between(sighting);
-        let sign = if depth == to { 1.0 } else { -1.0 };
+        let sign = if self.views.features[sighting.feature].depth == to { 1.0 } else { -1.0 };
         let rows = glance.rows.map(|row| row * sign);
-        Some(Sight { error: glance.error, axes: &at.posture.axes, rows, point: glance.point, from, to })
+        Sight { error: glance.error, axes: &at.posture.axes, rows, point: glance.point, from, to }
     }
 
     /// Predicted pixel of a feature [px]; `None` where camera or feature are not of the rig.
     pub fn pixel(&self, at: &Configuration, camera: usize, feature: usize) -> Option<[f64; 2]> {
         Some(self.sight(at, &Sighting { camera, feature, pixel: [0.0, 0.0] })?.error)
+    }
+}
+
+impl Configuration {
+    /// Takes over the velocity of a motion of `dt` seconds.
+    pub(super) fn move_at(&mut self, motion: &[f64], dt: f64) {
+        if dt > 0.0 {
+            self.velocity.iter_mut().zip(motion).for_each(|(velocity, motion)| *velocity = motion / dt);
+        }
     }
 }
 

@@ -52,6 +52,33 @@ fn a_rig_learned_from_the_recording_alone_reaches_the_target_in_two_commands() {
 }
 
 #[test]
+fn image_based_and_pose_based_controllers_run_with_their_settings_and_without_joint_readings() {
+    let folder = Folder::new("servo-visual");
+    let run = |scene: String| {
+        folder.write("scene.toml", &scene);
+        let (json, _) = folder.expect(0, "servo ur5 scene.toml --json");
+        let json: Value = serde_json::from_str(&json).unwrap();
+        assert_eq!(json["stop"], "converged", "{scene}");
+        let steps = json["steps"].as_array().unwrap();
+        steps.iter().map(|step| step["error_px"].as_f64().unwrap()).collect::<Vec<f64>>()
+    };
+    for (kind, slope) in [("image-based", 0.01), ("pose-based", 3.0)] {
+        let control = |more: &str| format!("[controller]\nkind = \"{kind}\"\n{more}\n");
+        let errors = run(format!("{SCENE}{}", control("")));
+        assert!(errors.len() <= 8, "{kind}: {errors:?}");
+        // Half of the error a command is left near the end.
+        let errors = run(format!("{SCENE}{}", control("gain = 0.5\nmatrix = \"mean\"")));
+        let left = errors[errors.len() - 1] / errors[errors.len() - 2];
+        assert!((left - 0.5).abs() < 0.05, "{kind}: {errors:?}");
+        let errors =
+            run(format!("{SCENE}{}", control(&format!("gain = {{ near = 1.0, far = 0.1, slope = {slope} }}"))));
+        assert!(errors[3] > 1.0, "{kind}: {errors:?}");
+        run(SCENE.replace("[target]", "readings = false\n[target]") + &control(""));
+        run(SCENE.replace("[target]", "readings = 0.05\n[target]") + &control("infer_joints = true"));
+    }
+}
+
+#[test]
 fn the_same_seed_gives_the_same_run_and_another_seed_another() {
     let folder = Folder::new("servo-seeds");
     let run = |seed: u64| folder.expect(0, &format!("servo ur5 ur5-noisy --json --seed {seed}")).0;
@@ -117,6 +144,18 @@ fn what_is_wrong_with_a_scene_is_said_with_its_place_and_what_would_do() {
         (
             "[robot]\n[target]\n[tracker]\nmissed = 2\n",
             "scene.toml:4:10: tracker: `missed`: must be from 0 to 1, found 2",
+        ),
+        (
+            "[robot]\nstart=[0]\n[target]\njoints=[0]\n[controller]\nkind = \"image\"\n",
+            "scene.toml:6:8: controller: `kind`: unknown controller `image` (",
+        ),
+        (
+            "[robot]\nstart=[0]\n[target]\njoints=[0]\n[controller]\ngain = 0.5\n",
+            "scene.toml:5:2: controller: `gain` is for image-based and pose-based, this is model-based",
+        ),
+        (
+            "[robot]\nstart=[0]\n[target]\njoints=[0]\n[controller]\nkind = \"pose-based\"\ngain = { near = 1.0, far = 2.0, slope = 1.0 }\n",
+            "scene.toml:7:28: controller: `gain`: `far`: must be at most 1, found 2",
         ),
         ("dt = 0\n[robot]\nstart=[0]\n[target]\njoints=[0]\n", "scene.toml:1:6: `dt`: must be above 0, found 0"),
     ];

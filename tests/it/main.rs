@@ -30,5 +30,7 @@ mod suggest;
 mod targets;
 mod tidy;
 mod uncalibrated;
+mod visual_servo;
+mod visual_servo_rough;
 mod weak;
 mod wrong_data;

@@ -11,14 +11,14 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// Joint positions of a rig that have its features in view.
-fn positions(rig: &Rig, count: usize, seed: u64) -> Vec<Vec<f64>> {
+pub fn positions(rig: &Rig, count: usize, seed: u64) -> Vec<Vec<f64>> {
     let options = SimulateOptions { samples: count, seed, in_view: 1.0, ..SimulateOptions::default() };
     let truth = simulate(rig, &options).unwrap().truth;
     truth.samples.into_iter().map(|sample| sample.joints.unwrap()).collect()
 }
 
 /// What all cameras see of all features, in view or not.
-fn look(arm: &Arm, rig: &Rig, joints: &[f64]) -> Vec<Sighting> {
+pub fn look(arm: &Arm, rig: &Rig, joints: &[f64]) -> Vec<Sighting> {
     let mut at = Configuration::default();
     arm.configure(joints, &mut at);
     let pairs = (0..rig.cameras.len()).flat_map(|camera| (0..rig.features.len()).map(move |feature| (camera, feature)));
@@ -27,12 +27,12 @@ fn look(arm: &Arm, rig: &Rig, joints: &[f64]) -> Vec<Sighting> {
         .collect()
 }
 
-fn mean_error(seen: &[Sighting], goal: &[Sighting]) -> f64 {
+pub fn mean_error(seen: &[Sighting], goal: &[Sighting]) -> f64 {
     let distance = |(a, b): (&Sighting, &Sighting)| (a.pixel[0] - b.pixel[0]).hypot(a.pixel[1] - b.pixel[1]);
     seen.iter().zip(goal).map(distance).sum::<f64>() / seen.len() as f64
 }
 
-fn moved(joints: &mut [f64], motion: &[f64]) {
+pub fn moved(joints: &mut [f64], motion: &[f64]) {
     joints.iter_mut().zip(motion).for_each(|(joint, step)| *joint += step);
 }
 

@@ -1,0 +1,58 @@
+//! Reading which controller a scene has.
+use super::Control;
+use crate::Error;
+use crate::rig::read::document::Node;
+use crate::servo::{Gain, ImageSettings, InteractionMatrix, PoseSettings};
+
+/// The words for controllers.
+const KINDS: &[&str] = &["model-based", "model-based-tip", "image-based", "pose-based"];
+
+/// The table `controller` of a scene.
+pub(super) fn read_control(node: Node) -> Result<Control, Error> {
+    let fields = node.table(&["kind", "speed", "matrix", "gain", "infer_joints"])?.labelled("controller");
+    let kind = fields.optional("kind", |node| node.word("controller", KINDS, |name| name))?.unwrap_or(KINDS[0]);
+    let is_visual = kind == "image-based" || kind == "pose-based";
+    if kind != "model-based-tip" && fields.field("speed").is_some() {
+        return Err(fields.error("`speed` ([m/s, rad/s]) is for model-based-tip; others take [limits]"));
+    }
+    if let Some(key) = ["matrix", "gain", "infer_joints"].iter().find(|key| !is_visual && fields.field(key).is_some()) {
+        return Err(fields.error(format!("`{key}` is for image-based and pose-based, this is {kind}")));
+    }
+    let name = InteractionMatrix::name;
+    let matrix = fields.optional("matrix", |node| node.word("interaction matrix", InteractionMatrix::ALL, name))?;
+    let matrix = matrix.unwrap_or_default();
+    let gain = fields.optional("gain", read_gain)?.unwrap_or_default();
+    let infer_joints = fields.optional("infer_joints", Node::flag)?.unwrap_or(false);
+    Ok(match kind {
+        "image-based" => Control::ImageBased(ImageSettings { matrix, gain, infer_joints, ..ImageSettings::default() }),
+        "pose-based" => Control::PoseBased(PoseSettings { matrix, gain, infer_joints, ..PoseSettings::default() }),
+        "model-based-tip" => {
+            let speed = fields.optional("speed", |node| node.numbers::<2>())?;
+            Control::ModelBasedTip { speed: speed.unwrap_or([f64::INFINITY; 2]) }
+        }
+        _ => Control::ModelBased,
+    })
+}
+
+/// A number, or `{ near, far, slope }`.
+fn read_gain(node: &Node) -> Result<Gain, Error> {
+    if !node.is_table() {
+        return read_share(node).map(Gain::Constant);
+    }
+    let fields = node.clone().table(&["near", "far", "slope"])?;
+    let need = |key: &str| fields.field(key).ok_or_else(|| fields.error(format!("has no `{key}`")));
+    Ok(Gain::Adaptive {
+        near: read_share(&need("near")?.value)?,
+        far: read_share(&need("far")?.value)?,
+        slope: need("slope")?.value.not_negative()?,
+    })
+}
+
+/// Above 0, and at most 1.
+fn read_share(node: &Node) -> Result<f64, Error> {
+    let share = node.positive()?;
+    if share > 1.0 {
+        return Err(node.error(format!("must be at most 1, found {share}")));
+    }
+    Ok(share)
+}
