@@ -12,6 +12,7 @@ pub mod infer;
 pub mod online;
 mod reach;
 pub mod recording;
+pub mod report;
 pub mod rig;
 pub mod scene;
 pub mod servo;

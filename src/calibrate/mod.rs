@@ -3,7 +3,7 @@ mod anchor;
 mod cures;
 mod deviations;
 mod direction;
-pub(crate) mod evaluate;
+mod evaluate;
 mod finish;
 mod gauge;
 mod graph;
@@ -35,8 +35,8 @@ mod variances;
 mod visual;
 mod weak;
 
-pub(crate) use evaluate::median;
 pub use evaluate::{CameraErrors, Errors, Evaluation, evaluate};
+pub(crate) use evaluate::{Correspondence, median};
 pub use influence::{Influence, most_influential, worst_fitting};
 pub use relearn::relearn;
 pub use report::{Calibration, Finding, Report, StageReport, TipDeviation};

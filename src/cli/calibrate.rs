@@ -13,6 +13,7 @@ use handeye::calibrate::{
     Calibration, Errors, Finding, NoiseTrial, Options, Progress, Report, TargetReport, TipDeviation, calibrate,
     relearn, select_noise,
 };
+use handeye::report;
 use handeye::rig::Rig;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -28,6 +29,7 @@ Examples:
   handeye calibrate monday.jsonl tuesday.jsonl --rig arm.toml -o learned.toml
   handeye calibrate motions.jsonl --rig ur5 -o learned.toml --folds 5   with held-out errors
   handeye calibrate motions.jsonl --rig arm.toml -o arm.toml            keeps its comments
+  handeye calibrate motions.jsonl -o learned.toml --report page.html    a page to read
   handeye calibrate three.jsonl --rig arm.toml --relearn cameras.left -o arm.toml   a camera that was moved
   handeye calibrate five.jsonl --rig arm.toml --relearn cameras.top -o arm.toml     a camera that is new
   handeye calibrate two.jsonl --rig arm.toml --relearn 'features.tool*' -o arm.toml another object in the gripper")]
@@ -60,6 +62,9 @@ pub struct Calibrate {
     /// Seed of every random choice: the same seed gives the same rig
     #[arg(long, value_name = "S", default_value_t = Options::default().seed)]
     seed: u64,
+    /// Also write a page to read: residuals, coverage, worst samples, weak directions, a view that can be turned
+    #[arg(long, value_name = "HTML")]
+    report: Option<PathBuf>,
     /// Threads to work on; the result does not depend on it [default: as many as there are cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
@@ -70,6 +75,12 @@ impl Calibrate {
         let input = self.rig.as_deref().map(read_rig).transpose()?;
         let recording = read_recordings_with_new(&self.recordings, input.as_ref(), &self.relearn)?;
         check_output(&self.output, &self.recordings)?;
+        if let Some(page) = &self.report {
+            check_output(page, &self.recordings)?;
+            if *page == self.output {
+                return Err(Error::Unusable(format!("{}: given for two outputs", page.display())));
+            }
+        }
         let (mut rig, text) = input.map_or_else(|| (Rig::default(), None), |input| (input.rig, Some(input.text)));
         let options = Options { seed: self.seed, estimate_noise: self.estimate_noise, influence: self.influence };
         let bar = Bar::new(is_json);
@@ -90,8 +101,20 @@ impl Calibrate {
             Ok((trials, folds, calibration, start.elapsed().as_secs_f64()))
         })?;
         drop(bar);
-        let Calibration { rig: learned, report } = calibration;
         let output = self.output.display();
+        if let Some(path) = &self.report {
+            let tables = folds.iter().map(Folds::as_table).collect::<Vec<_>>();
+            let subject = report::Subject {
+                title: &output.to_string(),
+                before: &rig,
+                calibration: &calibration,
+                recording: &recording,
+                tables: &tables,
+            };
+            let page = report::html(&subject)?;
+            std::fs::write(path, page).map_err(|source| Error::Io { path: path.clone(), source })?;
+        }
+        let Calibration { rig: learned, report } = calibration;
         let mut answer = Answer::new(describe(&rig, &learned, &report, seconds), report_json(&report));
         answer.json["seconds"] = json!(seconds);
         if !trials.is_empty() {

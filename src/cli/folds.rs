@@ -5,8 +5,12 @@ use super::{table::Table, words::errors_json};
 use handeye::Error;
 use handeye::calibrate::{Errors, Options, calibrate};
 use handeye::recording::{Recording, Sample};
+use handeye::report::ExtraTable;
 use handeye::rig::{Model, Rig};
 use serde_json::{Value, json};
+
+const TITLE: &str = "predicted without having been seen";
+const HEADER: [&str; 5] = ["held out", "detections", "rms px", "mean px", "median px"];
 
 /// Held-out errors of every fold, and of all folds together.
 pub struct Folds {
@@ -36,16 +40,25 @@ impl Folds {
     }
 
     pub fn text(&self) -> String {
-        let mut table = Table::new(&["held out", "detections", "rms px", "mean px", "median px"]);
+        let mut table = Table::new(&HEADER);
+        self.rows().into_iter().for_each(|row| table.row(row));
+        format!("{TITLE}, in {}:\n{table}", count(self.folds.len(), "fold"))
+    }
+
+    /// For a report.
+    pub fn as_table(&self) -> ExtraTable {
+        let header = HEADER.map(str::to_owned).to_vec();
+        ExtraTable { title: TITLE.to_owned(), header, rows: self.rows() }
+    }
+
+    /// One row per fold, and one of all.
+    fn rows(&self) -> Vec<Vec<String>> {
         let row = |name: String, errors: &Errors| {
             let pixels = [errors.rms_px, errors.mean_px, errors.median_px].map(px);
             [name, errors.observations.to_string()].into_iter().chain(pixels).collect::<Vec<_>>()
         };
-        for (fold, errors) in self.folds.iter().enumerate() {
-            table.row(row(format!("fold {}", fold + 1), errors));
-        }
-        table.row(row("together".to_owned(), &self.together));
-        format!("predicted without having been seen, in {}:\n{table}", count(self.folds.len(), "fold"))
+        let folds = self.folds.iter().enumerate().map(|(fold, errors)| row(format!("fold {}", fold + 1), errors));
+        folds.chain([row("together".to_owned(), &self.together)]).collect()
     }
 
     pub fn json(&self) -> Value {

@@ -95,7 +95,7 @@ fn one_axis(tips: &[Option<Pose>]) -> Option<Finding> {
 
 /// Lengths that only millimetres would explain.
 fn distances(rig: &Rig, recording: &Recording) -> Vec<Finding> {
-    let far = |mut lengths: Vec<f64>| !lengths.is_empty() && crate::calibrate::evaluate::median(&mut lengths) > FAR;
+    let far = |mut lengths: Vec<f64>| !lengths.is_empty() && crate::calibrate::median(&mut lengths) > FAR;
     let samples = &recording.samples;
     let mut findings = Vec::new();
     let mut add = |what: String| findings.push(Finding { what, change: "divide their positions by 1000".into() });

@@ -51,7 +51,7 @@ fn period(recording: &Recording) -> Option<f64> {
     if rows.len() < 10 || rows.len() < recording.samples.len() / 2 {
         return None;
     }
-    let median = |mut values: Vec<f64>| crate::calibrate::evaluate::median(&mut values);
+    let median = |mut values: Vec<f64>| crate::calibrate::median(&mut values);
     let dense = |joint: usize| {
         let readings = || rows.iter().map(|(_, joints)| joints[joint]);
         let range = readings().fold(f64::NEG_INFINITY, f64::max) - readings().fold(f64::INFINITY, f64::min);

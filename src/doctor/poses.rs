@@ -1,7 +1,7 @@
 //! Robot and targets as two motions: which reading of them agrees with a rigid camera and a rigid target (a X = Z b).
 use super::undo;
 use super::{Finding, Misfit, Score, is_clearly_better};
-use crate::calibrate::evaluate::median;
+use crate::calibrate::median;
 use crate::geometry::robot_world;
 use crate::recording::Recording;
 use crate::rig::{Parent, Rig};

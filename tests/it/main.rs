@@ -20,6 +20,7 @@ mod not_enough;
 mod readme;
 mod recording_files;
 mod relearn;
+mod report;
 mod rig_files;
 mod servo;
 mod servo_experiments;

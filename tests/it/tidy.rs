@@ -17,6 +17,7 @@ const ORDER: &[&[&str]] = &[
     &["infer"],
     &["servo"],
     &["scene"],
+    &["report"],
     &["experiments"],
     &["cli"],
 ];

@@ -1,0 +1,82 @@
+//! The view that can be turned: arm, cameras and features, where the rig puts them.
+use super::Subject;
+use super::page::Page;
+use crate::Error;
+use crate::rig::{Model, Rig};
+use handeye_solvers::Pose;
+use nalgebra::Vector3;
+use serde_json::{Value, json};
+
+/// Arms that are drawn besides the first, and tips at most.
+const ARMS: usize = 8;
+const TIPS: usize = 500;
+
+/// Draws the arm in some samples, the tip in all.
+pub(super) fn view(page: &mut Page, subject: &Subject<'_>) -> Result<(), Error> {
+    let rig = &subject.calibration.rig;
+    let model = Model::new(rig)?;
+    let samples = &subject.recording.samples;
+    let of_sample = |sample: &crate::recording::Sample| {
+        let joints = sample.joints.as_ref().filter(|joints| joints.len() == model.chain.len() && !joints.is_empty());
+        joints.map(|joints| model.links(joints)).or_else(|| sample.pose.map(|pose| vec![model.base, pose]))
+    };
+    let mut states: Vec<Vec<Pose>> = samples.iter().filter_map(of_sample).collect();
+    if states.is_empty() {
+        states.push(model.links(&vec![0.0; model.chain.len()]));
+    }
+    let spread = |most: usize| (0..states.len()).step_by(states.len().div_ceil(most).max(1));
+    let points = |links: &[Pose]| links.iter().map(|link| numbers(&link.translation)).collect::<Vec<_>>();
+    let tip = |links: &Vec<Pose>| links[links.len() - 1].translation;
+    let first = &states[0];
+    let features: Vec<Vector3<f64>> =
+        model.features.iter().map(|feature| model.carrier(feature.parent, first).transform(&feature.xyz)).collect();
+    let cameras: Vec<Pose> =
+        model.cameras.iter().map(|camera| model.carrier(camera.parent, first) * camera.pose).collect();
+    let tips: Vec<Vector3<f64>> = spread(TIPS).map(|index| tip(&states[index])).collect();
+    let all = || {
+        tips.iter()
+            .copied()
+            .chain(features.iter().copied())
+            .chain(cameras.iter().map(|pose| pose.translation))
+            .chain([model.base.translation])
+    };
+    let count = all().count() as f64;
+    let centre = all().sum::<Vector3<f64>>() / count;
+    let radius = all().map(|point| (point - centre).norm()).fold(1e-9, f64::max);
+    let axis = |k: usize| {
+        let end = model.base.transform(&(Vector3::ith(k, 0.15 * radius)));
+        json!([numbers(&model.base.translation), numbers(&end)])
+    };
+    let data = json!({
+        "centre": numbers(&centre),
+        "radius": radius,
+        "arms": spread(ARMS + 1).map(|index| points(&states[index])).collect::<Vec<_>>(),
+        "tips": tips.iter().map(numbers).collect::<Vec<_>>(),
+        "features": features.iter().map(numbers).collect::<Vec<_>>(),
+        "cameras": cameras.iter().enumerate().map(|(index, pose)| frustum(rig, index, pose, 0.15 * radius)).collect::<Vec<_>>(),
+        "axes": (0..3).map(axis).collect::<Vec<_>>(),
+    });
+    page.section("view-section", "Where everything is");
+    page.view(
+        &data.to_string(),
+        "drag to turn: the arm in its first sample and in others, the tip in all, features, cameras; axes at the base",
+    );
+    Ok(())
+}
+
+/// A camera's centre and its image at a distance.
+fn frustum(rig: &Rig, index: usize, pose: &Pose, distance: f64) -> Value {
+    let camera = &rig.cameras[index];
+    let [width, height] = camera.size.unwrap_or([640, 480]).map(f64::from);
+    let (fx, fy) = (camera.fx.unwrap_or(width), camera.fy.unwrap_or(width));
+    let corner = |u: f64, v: f64| pose.transform(&(Vector3::new(u * width / fx, v * height / fy, 1.0) * distance));
+    let corners = [corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)];
+    let image: Vec<Value> = (0..5).map(|k| numbers(&corners[k % 4])).collect();
+    let rays = corners.iter().map(|corner| json!([numbers(&pose.translation), numbers(corner)]));
+    json!({ "name": camera.name, "lines": rays.chain([json!(image)]).collect::<Vec<_>>() })
+}
+
+/// To a tenth of a millimetre.
+fn numbers(point: &Vector3<f64>) -> Value {
+    json!(point.iter().map(|x| (x * 1e4).round() / 1e4).collect::<Vec<f64>>())
+}

@@ -1,0 +1,130 @@
+//! The drawings: each a function from numbers to SVG whose colours are the page's.
+use super::page::escaped;
+use super::residuals::Residual;
+use std::fmt::Write;
+
+/// Points that a drawing shows at most: more is a blot, and a heavy page.
+const POINTS: usize = 3000;
+
+/// Residuals around nothing, as far as `reach` [px] to each side; those beyond it lie on the edge.
+pub(super) fn scatter(residuals: &[&Residual], sd: f64) -> String {
+    let reach = 4.0 * sd;
+    let place = |error: f64| 150.0 + 130.0 * (error / reach).clamp(-1.0, 1.0);
+    let mut svg = open(300.0, 300.0);
+    for radius in [1.0, 2.0, 3.0] {
+        let r = 130.0 * radius / 4.0;
+        let _ = write!(svg, "<circle class=\"axis\" cx=\"150\" cy=\"150\" r=\"{r:.1}\"/>");
+    }
+    svg += "<path class=\"axis\" d=\"M20 150H280M150 20V280\"/>";
+    for residual in residuals.iter().step_by(residuals.len().div_ceil(POINTS).max(1)) {
+        let [x, y] = residual.error.map(place);
+        let class = if residual.distance() > reach { "bad" } else { "mark" };
+        let _ = write!(svg, "<circle class=\"{class}\" fill-opacity=\"0.5\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"1.8\"/>");
+    }
+    let _ = write!(svg, "<text x=\"284\" y=\"146\" text-anchor=\"end\">{reach:.2} px</text></svg>");
+    svg
+}
+
+/// Residuals where they were seen, `scale` times as long as they are.
+pub(super) fn map(residuals: &[&Residual], [width, height]: [f64; 2], scale: f64) -> String {
+    let mut svg = open(width, height);
+    let _ = write!(
+        svg,
+        "<rect class=\"axis\" x=\"0.5\" y=\"0.5\" width=\"{:.0}\" height=\"{:.0}\"/>",
+        width - 1.0,
+        height - 1.0
+    );
+    let (dot, line) = (width / 320.0, width / 500.0);
+    for residual in residuals.iter().step_by(residuals.len().div_ceil(POINTS).max(1)) {
+        let [u, v] = residual.seen;
+        let end = [u + scale * residual.error[0], v + scale * residual.error[1]];
+        let _ = write!(
+            svg,
+            "<circle class=\"mark\" cx=\"{u:.1}\" cy=\"{v:.1}\" r=\"{dot:.1}\"/>\
+             <path class=\"arrow\" stroke-width=\"{line:.1}\" d=\"M{u:.1} {v:.1}L{:.1} {:.1}\"/>",
+            end[0], end[1]
+        );
+    }
+    svg + "</svg>"
+}
+
+/// How often each value occurs, as shares per unit, with a density that is expected.
+pub(super) fn histogram(
+    values: &[f64],
+    [low, high]: [f64; 2],
+    bins: usize,
+    expected: Option<&dyn Fn(f64) -> f64>,
+) -> String {
+    let [left, top, width, height] = [40.0, 10.0, 540.0, 200.0];
+    let step = (high - low) / bins as f64;
+    let mut counts = vec![0.0; bins];
+    for value in values {
+        let bin = ((value - low) / step).floor().clamp(0.0, (bins - 1) as f64);
+        counts[bin as usize] += 1.0 / (values.len() as f64 * step);
+    }
+    let curve: Vec<(f64, f64)> = expected.map_or_else(Vec::new, |density| {
+        (0..=120).map(|k| low + (high - low) * f64::from(k) / 120.0).map(|x| (x, density(x))).collect()
+    });
+    let most = counts.iter().copied().chain(curve.iter().map(|(_, y)| *y)).fold(1e-300, f64::max);
+    let x = |value: f64| left + width * (value - low) / (high - low);
+    let y = |density: f64| top + height * (1.0 - density / most);
+    let mut svg = open(600.0, 240.0);
+    for (bin, density) in counts.iter().enumerate() {
+        let from = x(low + bin as f64 * step);
+        let _ = write!(
+            svg,
+            "<rect class=\"mark\" fill-opacity=\"0.7\" x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\"/>",
+            from + 0.5,
+            y(*density),
+            (width / bins as f64 - 1.0).max(0.5),
+            top + height - y(*density)
+        );
+    }
+    if !curve.is_empty() {
+        let points: Vec<String> =
+            curve.iter().map(|(at, density)| format!("{:.1},{:.1}", x(*at), y(*density))).collect();
+        let _ = write!(svg, "<polyline class=\"expected\" points=\"{}\"/>", points.join(" "));
+    }
+    let _ = write!(svg, "<path class=\"axis\" d=\"M{left} {0}H{1}\"/>", top + height, left + width);
+    for tick in 0..=4 {
+        let at = low + (high - low) * f64::from(tick) / 4.0;
+        let _ = write!(svg, "<text x=\"{:.1}\" y=\"228\" text-anchor=\"middle\">{at:.2}</text>", x(at));
+    }
+    svg + "</svg>"
+}
+
+/// Where every joint has been: a strip each, between its limits where they are known.
+pub(super) fn strips(strips: &[Strip]) -> String {
+    let height = 34.0 * strips.len() as f64 + 10.0;
+    let mut svg = open(600.0, height);
+    for (row, strip) in strips.iter().enumerate() {
+        let y = 34.0 * row as f64 + 20.0;
+        let [low, high] = strip.range;
+        let x = |value: f64| 170.0 + 400.0 * (value - low) / (high - low).max(1e-12);
+        let _ = write!(svg, "<text x=\"0\" y=\"{:.0}\">{}</text>", y + 4.0, escaped(&strip.name));
+        let _ = write!(svg, "<path class=\"axis\" d=\"M170 {y}H570\"/>");
+        for value in strip.values.iter().step_by(strip.values.len().div_ceil(400).max(1)) {
+            let _ = write!(
+                svg,
+                "<path class=\"line\" stroke-opacity=\"0.5\" d=\"M{0:.1} {1}V{2}\"/>",
+                x(*value),
+                y - 7.0,
+                y + 7.0
+            );
+        }
+        let _ = write!(svg, "<text x=\"164\" y=\"{0:.0}\" text-anchor=\"end\">{low:.2}</text>", y + 4.0);
+        let _ = write!(svg, "<text x=\"600\" y=\"{0:.0}\" text-anchor=\"end\">{high:.2}</text>", y + 18.0);
+    }
+    svg + "</svg>"
+}
+
+/// A joint's readings, and the range that they are drawn in.
+pub(super) struct Strip {
+    pub name: String,
+    pub range: [f64; 2],
+    pub values: Vec<f64>,
+}
+
+fn open(width: f64, height: f64) -> String {
+    format!("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width:.0} {height:.0}\" role=\"img\">")
+}

@@ -1,0 +1,100 @@
+//! Predicted minus seen, detection by detection.
+use crate::Error;
+use crate::calibrate::Correspondence;
+use crate::infer::{InferOptions, Inference, Names, Prior, TipInference};
+use crate::recording::{Recording, Sample};
+use crate::rig::{Model, Rig};
+use handeye_solvers::Pose;
+
+/// How far a detection is from what a rig predicts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Residual {
+    /// Index of the sample in the recording.
+    pub sample: usize,
+    /// Index of the camera in the rig.
+    pub camera: usize,
+    /// Index of the feature in the rig.
+    pub feature: usize,
+    /// Where it was seen [px].
+    pub seen: [f64; 2],
+    /// Predicted minus seen [px].
+    pub error: [f64; 2],
+}
+
+impl Residual {
+    /// Its length [px].
+    pub fn distance(&self) -> f64 {
+        self.error[0].hypot(self.error[1])
+    }
+}
+
+/// Of every detection whose camera and feature the rig knows and whose sample's state is read, or determined by its pixels. Readings that
+/// are noisy are refined by the pixels first, as they were when the rig was learned.
+///
+/// Errors: [`Error::Unusable`] where the rig is not complete or has another number of joints.
+pub fn residuals(rig: &Rig, recording: &Recording) -> Result<Vec<Residual>, Error> {
+    let model = Model::new(rig)?;
+    let index = Correspondence::new(rig, recording);
+    let mut states = States::new(rig, recording)?;
+    let mut residuals = Vec::new();
+    for (number, sample) in recording.samples.iter().enumerate() {
+        let Some(links) = states.links(&model, sample)? else { continue };
+        for detection in &sample.pixels {
+            let known = (index.cameras[detection.camera as usize], index.features[detection.feature as usize]);
+            let (Some(camera), Some(feature)) = known else { continue };
+            let [u, v] = model.pixel(camera, feature, &links);
+            let error = [u - detection.pixel[0], v - detection.pixel[1]];
+            residuals.push(Residual { sample: number, camera, feature, seen: detection.pixel, error });
+        }
+    }
+    Ok(residuals)
+}
+
+/// Where the links are in a sample.
+struct States {
+    names: Names,
+    /// `None` for a rig without joints.
+    joints: Option<Inference>,
+    tip: TipInference,
+    /// Standard deviations of readings.
+    joint_sd: f64,
+    is_pose_exact: bool,
+}
+
+impl States {
+    fn new(rig: &Rig, recording: &Recording) -> Result<Self, Error> {
+        let n = rig.robot.joints.len();
+        let has_joints = recording.samples.iter().any(|sample| sample.joints.is_some());
+        if has_joints && n != recording.joints.len() {
+            return Err(Error::Unusable(format!("the rig has {n} joints, the recording {}", recording.joints.len())));
+        }
+        let joints = if n > 0 { Some(Inference::new(rig, InferOptions::default())?) } else { None };
+        Ok(States {
+            names: Names::new(rig, recording),
+            joints,
+            tip: TipInference::new(rig)?,
+            joint_sd: rig.noise.joints,
+            is_pose_exact: !rig.noise.pose.is_noisy(),
+        })
+    }
+
+    /// `None` where nothing determines them.
+    fn links(&mut self, model: &Model, sample: &Sample) -> Result<Option<Vec<Pose>>, Error> {
+        let seen = self.names.sightings(sample);
+        if let (Some(inference), Some(read)) = (&mut self.joints, &sample.joints) {
+            if self.joint_sd <= 0.0 {
+                return Ok(Some(model.links(read)));
+            }
+            let refined = inference.joints_near(&seen, &Prior::readings(read, self.joint_sd));
+            return Ok(refined.ok().map(|branch| model.links(&branch.joints)));
+        }
+        if let Some(pose) = sample.pose.filter(|_| self.is_pose_exact) {
+            return Ok(Some(vec![model.base, pose]));
+        }
+        // A chain has no say where its joints were not read; the tip's pose is all that pixels of features on it need.
+        let tip = self.tip.poses(&seen).into_iter().next();
+        Ok(tip.map(|tip| {
+            if self.joints.is_some() { vec![tip.pose; model.chain.len() + 1] } else { vec![model.base, tip.pose] }
+        }))
+    }
+}

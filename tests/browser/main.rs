@@ -1,0 +1,87 @@
+//! The pages that handeye writes, in a real browser: every drawing is there, nothing overflows, no script fails. Needs Chromium; says so
+//! where there is none.
+use std::path::Path;
+use std::process::Command;
+
+/// What the browser is asked: it writes its answer into the page.
+const CHECK: &str = "<script>
+addEventListener('load', () => {
+  const root = document.documentElement;
+  const canvas = document.getElementById('view');
+  const pixels = canvas ? canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data : [];
+  const empty = [...document.querySelectorAll('svg')].filter((svg) => svg.getBoundingClientRect().height < 20 || !svg.children.length);
+  const wide = [...document.querySelectorAll('main *')].filter((element) =>
+    !element.closest('.wide') && !element.closest('svg') && element.getBoundingClientRect().right > root.clientWidth + 1);
+  document.title = JSON.stringify({
+    errors: window.failures,
+    overflows: root.scrollWidth > root.clientWidth + 1 || wide.length > 0,
+    drawings: document.querySelectorAll('svg').length,
+    empty: empty.length,
+    drawn: pixels.some((value) => value > 0),
+    ink: getComputedStyle(document.body).color,
+  });
+});
+</script>";
+
+/// Collects what scripts throw, from before the first of them.
+const LISTEN: &str =
+    "<script>window.failures = []; addEventListener('error', (event) => window.failures.push(event.message));</script>";
+
+fn chromium() -> Option<&'static str> {
+    ["chromium", "chromium-browser", "google-chrome"]
+        .into_iter()
+        .find(|name| Command::new(name).arg("--version").output().is_ok_and(|output| output.status.success()))
+}
+
+/// The answer of a page at a width, in light or dark.
+fn ask(browser: &str, page: &Path, width: u32, dark: bool) -> serde_json::Value {
+    let profile = page.with_extension("profile");
+    let mut command = Command::new(browser);
+    command.args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"]);
+    command.args(["--disable-background-networking", "--disable-component-update", "--hide-scrollbars", "--dump-dom"]);
+    command.arg(format!("--user-data-dir={}", profile.display())).arg(format!("--window-size={width},900"));
+    if dark {
+        command.arg("--blink-settings=preferredColorScheme=0");
+    }
+    let output = command.arg(format!("file://{}", page.display())).output().unwrap();
+    let dom = String::from_utf8_lossy(&output.stdout).into_owned();
+    let title = dom.split("<title>").nth(1).and_then(|rest| rest.split("</title>").next()).unwrap_or_default();
+    let title = title.replace("&quot;", "\"").replace("&amp;", "&").replace("&lt;", "<").replace("&gt;", ">");
+    serde_json::from_str(&title).unwrap_or_else(|_| panic!("the page gave no answer: {title}"))
+}
+
+#[test]
+fn a_calibration_report_is_whole_on_screen_and_phone_in_light_and_dark() {
+    let Some(browser) = chromium() else {
+        return println!("no Chromium is here (apt-get install chromium): the pages were not looked at");
+    };
+    let folder = std::env::temp_dir().join(format!("handeye-browser-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let run = |arguments: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_handeye"));
+        let output = command.args(arguments.split_whitespace()).current_dir(&folder).output().unwrap();
+        assert!(output.status.success(), "{arguments}: {}", String::from_utf8_lossy(&output.stderr));
+    };
+    run("simulate ur5 --samples 40 --outliers 0.02 -o motions.jsonl");
+    run("calibrate motions.jsonl -o learned.toml --report page.html --influence");
+    let page = std::fs::read_to_string(folder.join("page.html")).unwrap();
+    let page =
+        page.replacen("<head>", &format!("<head>{LISTEN}"), 1).replacen("</body>", &format!("{CHECK}</body>"), 1);
+    let path = folder.join("checked.html");
+    std::fs::write(&path, page).unwrap();
+    let mut inks = Vec::new();
+    for (width, dark) in [(1100, false), (500, false), (1100, true)] {
+        let answer = ask(browser, &path, width, dark);
+        assert_eq!(answer["errors"], serde_json::json!([]), "{width} px wide");
+        assert_eq!(
+            (&answer["overflows"], &answer["drawn"]),
+            (&false.into(), &true.into()),
+            "{width} px wide: {answer}"
+        );
+        // A scatter and a map of each camera, a histogram, the joints, and at least four images of bad samples.
+        assert!(answer["drawings"].as_u64().unwrap() >= 10 && answer["empty"] == 0, "{answer}");
+        inks.push(answer["ink"].clone());
+    }
+    assert!(inks[0] == inks[1] && inks[0] != inks[2], "dark pages have another ink: {inks:?}");
+    let _ = std::fs::remove_dir_all(&folder);
+}

@@ -1,0 +1,105 @@
+//! `calibrate --report` writes a page that holds everything, stands alone, and says what was found.
+use crate::cli::Folder;
+use handeye::calibrate::{Options, calibrate};
+use handeye::report::{Subject, html, residuals};
+use handeye::rig::{Rig, catalog};
+use handeye::simulate::{SimulateOptions, simulate};
+use serde_json::Value;
+use std::ops::ControlFlow;
+
+/// Headings of a page from nothing but a recording.
+const SECTIONS: &[&str] = &[
+    "How good it is",
+    "Cameras",
+    "Are the errors noise?",
+    "The samples that fit worst",
+    "Where the joints have been",
+    "Where everything is",
+    "What was learned",
+    "What the recording cannot tell",
+    "How it was found",
+    "What to do next",
+];
+
+#[test]
+fn a_page_has_every_section_stands_alone_and_holds_the_figures_of_the_command() {
+    let folder = Folder::new("report");
+    folder.expect(0, "simulate ur5 --samples 40 --seed 3 --outliers 0.01 -o motions.jsonl");
+    let (json, _) =
+        folder.expect(0, "calibrate motions.jsonl -o learned.toml --report page.html --influence --folds 4 --json");
+    let json: Value = serde_json::from_str(&json).unwrap();
+    let page = folder.read("page.html");
+    for heading in SECTIONS.iter().chain(&["The samples that matter most", "predicted without having been seen"]) {
+        assert!(page.contains(&format!("<h2>{heading}</h2>")), "{heading} is missing");
+    }
+    // Nothing is fetched: no address but the name of SVG.
+    let addresses = page.matches("://").count();
+    assert_eq!(addresses, page.matches("http://www.w3.org/2000/svg").count());
+    assert!(!page.contains("NaN") && !page.contains("src=") && !page.contains("<link"));
+    let figure = format!("{:.3} px", json["rms_px"].as_f64().unwrap());
+    assert!(page.contains(&figure), "{figure}");
+    assert!(page.contains("detections do not fit and were left out"));
+    for path in ["robot.joints.elbow.alpha", "cameras.left.pose", "features.f11.xyz"] {
+        assert!(page.contains(&format!("<td>{path}</td>")), "{path}");
+    }
+    let data = page.split("type=\"application/json\">").nth(1).unwrap().split("</script>").next().unwrap();
+    let scene: Value = serde_json::from_str(data).unwrap();
+    assert_eq!((scene["cameras"].as_array().unwrap().len(), scene["features"].as_array().unwrap().len()), (2, 12));
+    assert_eq!(scene["tips"].as_array().unwrap().len(), 40);
+}
+
+#[test]
+fn residuals_are_the_errors_of_the_calibration_whatever_is_known_of_the_state() {
+    let truth = catalog::rig("ur5").unwrap();
+    for (joints, action) in [(0.0, 0.0), (0.01, 0.0), (0.0, 0.01)] {
+        let mut rig = truth.clone();
+        (rig.noise.joints, rig.noise.joint_action) = (joints, action);
+        let mut recording =
+            simulate(&rig, &SimulateOptions { seed: 5, ..SimulateOptions::default() }).unwrap().recording;
+        if action > 0.0 {
+            recording.samples.iter_mut().for_each(|sample| sample.joints = None);
+        }
+        let known = Rig { noise: rig.noise, ..Rig::default() };
+        let learned = calibrate(&known, &recording, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap();
+        let all = residuals(&learned.rig, &recording).unwrap();
+        assert_eq!(all.len(), learned.report.observations);
+        let rms = (all.iter().map(|residual| residual.distance().powi(2)).sum::<f64>() / all.len() as f64).sqrt();
+        // States are inferred sample by sample, without the actions between them.
+        assert!((rms / learned.report.rms_px - 1.0).abs() < 0.1, "{joints} {action}: {rms} {}", learned.report.rms_px);
+    }
+}
+
+#[test]
+fn names_that_mean_something_to_html_are_text() {
+    let truth = catalog::rig("ur5").unwrap();
+    let recording = simulate(&truth, &SimulateOptions { samples: 20, ..SimulateOptions::default() }).unwrap().recording;
+    let learned = calibrate(&truth, &recording, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap();
+    let subject = Subject {
+        title: "<script>alert(1)</script> & co.toml",
+        before: &truth,
+        calibration: &learned,
+        recording: &recording,
+        tables: &[],
+    };
+    let page = html(&subject).unwrap();
+    assert!(
+        page.contains("<h1>&lt;script&gt;alert(1)&lt;/script&gt; &amp; co.toml</h1>")
+            && !page.contains("<script>alert")
+    );
+    assert_eq!(page, html(&subject).unwrap(), "the same calibration gives the same bytes");
+}
+
+#[test]
+fn a_page_is_not_written_over_an_input_or_the_rig() {
+    let folder = Folder::new("report-output");
+    folder.expect(0, "simulate ur5 --samples 20 -o motions.jsonl");
+    for (page, message) in [
+        ("motions.jsonl", "it is an input too"),
+        ("out.toml", "given for two outputs"),
+        ("no/page.html", "no/page.html"),
+    ] {
+        let (_, complaint) = folder.expect(2, &format!("calibrate motions.jsonl -o out.toml --report {page}"));
+        assert!(complaint.contains(message), "{complaint}");
+    }
+    assert_eq!(folder.names(), ["motions.jsonl"]);
+}
