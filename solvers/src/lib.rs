@@ -2,12 +2,14 @@
 //!
 //! Knows no robot, no camera and no file: see the crate `handeye` for those.
 mod accumulate;
+mod active_set;
 mod batch;
 pub mod check;
 mod chunks;
 mod covariance;
 mod derivative;
 mod eigen;
+mod elastic;
 mod error;
 mod factor;
 mod gauss_newton;
@@ -48,7 +50,7 @@ pub use manifold::{Direction, DynamicVector, Pose, Rotation, Variable, Vector};
 pub use minibatches::Minibatches;
 pub use nalgebra;
 pub use noise::Noise;
-pub use quadratic_program::{Qp, QpEnd, QpSolution, QuadraticProgram};
+pub use quadratic_program::{Constraint, Qp, QpEnd, QpSolution, QuadraticProgram};
 pub use report::{Iteration, Observer, Report, Termination};
 pub use scalar::Scalar;
 pub use variables::{Key, Variables};

@@ -1,5 +1,5 @@
 //! Small quadratic programs: against an independent active-set enumeration, at every size that a control loop has.
-use handeye_solvers::{Qp, QpEnd, QuadraticProgram};
+use handeye_solvers::{Constraint, Qp, QpEnd, QuadraticProgram};
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -92,14 +92,14 @@ fn minima_are_those_of_an_enumeration_of_active_sets() {
             assert_ne!(found.end, QpEnd::Failed);
             constrained += usize::from(found.end == QpEnd::Constrained);
             let error = (DVector::from_column_slice(&found.x) - &expected).norm();
-            assert!(error < 1e-5, "{n} unknowns, {m} rows: {error:.1e} off, {:?}", found.end);
+            assert!(error < 1e-9, "{n} unknowns, {m} rows: {error:.1e} off, {:?}", found.end);
             // The multipliers balance the gradient: H x + g + z + Aᵀ y = 0.
             let x = DVector::from_column_slice(&found.x);
             let rows = DMatrix::from_row_slice(m, n, &problem.rows);
             let pull = DVector::from_column_slice(&found.of_box)
                 + rows.transpose() * DVector::from_column_slice(&found.of_rows);
             let balance = (&problem.hessian * x + &problem.gradient + pull).norm();
-            assert!(balance < 1e-3, "{n} unknowns, {m} rows: multipliers are {balance:.1e} off");
+            assert!(balance < 1e-9, "{n} unknowns, {m} rows: multipliers are {balance:.1e} off");
             assert!(found.slack.iter().all(|slack| *slack == 0.0), "{:?}", found.slack);
         }
         assert!(constrained > 50, "only {constrained} of 100 problems had anything active");
@@ -142,6 +142,60 @@ fn the_box_holds_and_the_weaker_row_gives_way() {
         let slack = [1.0 + expected, 1.0 - expected];
         assert!(found.slack.iter().zip(slack).all(|(a, b)| (a - b).abs() < 1e-5), "{found:?}");
     }
+}
+
+/// True where constraints (a, b) have a point in common: a corner of what they and a wide box enclose.
+fn can_hold(constraints: &[(DVector<f64>, f64)], n: usize) -> bool {
+    let unit = |i: usize, sign: f64| DVector::from_fn(n, |k, _| if k == i { sign } else { 0.0 });
+    let wide = (0..n).flat_map(|i| [(unit(i, 1.0), 1e6), (unit(i, -1.0), 1e6)]);
+    let all: Vec<_> = constraints.iter().cloned().chain(wide).collect();
+    (0..1_u32 << all.len()).filter(|set| set.count_ones() as usize == n).any(|set| {
+        let faces: Vec<_> = (0..all.len()).filter(|i| set >> i & 1 == 1).collect();
+        let square = DMatrix::from_fn(n, n, |row, column| all[faces[row]].0[column]);
+        let right = DVector::from_fn(n, |row, _| all[faces[row]].1);
+        let corner = square.lu().solve(&right);
+        corner.is_some_and(|corner| all.iter().all(|(a, b)| a.dot(&corner) <= b + 1e-8 * (1.0 + a.norm())))
+    })
+}
+
+#[test]
+fn constraints_that_cannot_all_hold_are_named_as_a_minimal_set() {
+    let random = &mut ChaCha8Rng::seed_from_u64(3);
+    let (mut conflicts, mut sizes) = (0, [0; 5]);
+    for trial in 0..4000 {
+        let (n, m) = (1 + trial % 3, 1 + trial / 3 % 5);
+        let mut problem = Problem::random(n, m, random, true);
+        problem.bounds.iter_mut().for_each(|bound| *bound = random.random_range(-0.6..0.3));
+        if trial % 7 == 0 {
+            problem.upper[0] = problem.lower[0];
+        }
+        let strengths = vec![1.0; m];
+        let mut program = QuadraticProgram::new(n, m);
+        let found = program.solve(&problem.qp(&strengths));
+        assert_ne!(found.end, QpEnd::Failed, "trial {trial}");
+        let constraints = problem.constraints();
+        let possible = can_hold(&constraints, n);
+        assert_eq!(found.conflict.is_empty(), possible, "trial {trial}: {found:?}");
+        assert_eq!(found.slack.iter().all(|slack| *slack == 0.0), possible, "trial {trial}: {found:?}");
+        if possible {
+            continue;
+        }
+        conflicts += 1;
+        sizes[found.conflict.len()] += 1;
+        let named = |constraint: &Constraint| match *constraint {
+            Constraint::Upper(i) => constraints[2 * i].clone(),
+            Constraint::Lower(i) => constraints[2 * i + 1].clone(),
+            Constraint::Row(i) => constraints[2 * n + i].clone(),
+        };
+        let set: Vec<_> = found.conflict.iter().map(named).collect();
+        assert!(!can_hold(&set, n), "trial {trial}: {:?} can all hold", found.conflict);
+        for left_out in 0..set.len() {
+            let mut rest = set.clone();
+            rest.remove(left_out);
+            assert!(can_hold(&rest, n), "trial {trial}: {:?} without one cannot hold either", found.conflict);
+        }
+    }
+    assert!(conflicts > 1000 && sizes[2..].iter().all(|size| *size > 20), "{conflicts} conflicts of sizes {sizes:?}");
 }
 
 #[test]
