@@ -6,71 +6,112 @@ use handeye::infer::Sighting;
 use handeye::rig::Rig;
 use handeye::servo::limits::InImage;
 use handeye::servo::tasks::ImagePoints;
-use handeye::servo::{Arm, Configuration, Goal, ImageBased, ImageSettings, Limit, Stepper};
+use handeye::servo::{
+    Arm, Configuration, Goal, ImageBased, ImageSettings, JointBounds, Limit, LimitRows, MotionSolver, Stepper, Task,
+    TaskRows,
+};
 use handeye::simulate::{SimulateOptions, random_rig, simulate};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Counts what is asked for.
-struct Counting;
-
-static ASKED: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: every call is passed on to the system's allocator as it is.
-#[allow(unsafe_code)]
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ASKED.fetch_add(1, Ordering::Relaxed);
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
+#[path = "common/counting.rs"]
+mod counting;
+use counting::asked;
 
 /// Steps that are timed.
 const STEPS: usize = 2_000;
 
-fn main() {
-    println!("{:44} {:>10} {:>8} {:>9} {:>12}", "", "median µs", "99 % µs", "required", "allocations");
-    row("no limit active", f64::INFINITY, false, "3");
-    row("joint speeds active, through Clarabel", 0.05, false, "35");
-    row("and 24 rows of visibility, through Clarabel", 0.05, true, "120");
-    image_based("ImageBased, mean matrix, no limit active");
+/// A situation: how fast joints may move in a step [rad], and how far 6 features must be inside an image [px].
+struct Setting {
+    name: &'static str,
+    speed: f64,
+    margin: Option<f64>,
 }
 
-fn row(name: &str, speed: f64, visible: bool, required: &str) {
-    let mut rig = random_rig(6, 2, 12, 3);
-    let places = positions(&rig, STEPS + 1);
-    for joint in &mut rig.robot.joints {
-        // Wide enough for whole steps.
-        (joint.limits.lower, joint.limits.upper, joint.limits.velocity) = (Some(-50.0), Some(50.0), Some(speed));
+const SETTINGS: [Setting; 4] = [
+    Setting { name: "no limit active", speed: f64::INFINITY, margin: None },
+    Setting { name: "joint speeds active", speed: 0.05, margin: None },
+    Setting { name: "and 24 rows of visibility", speed: 0.05, margin: Some(5.0) },
+    Setting { name: "of which some cannot hold, through Clarabel", speed: 0.05, margin: Some(200.0) },
+];
+
+fn main() {
+    println!("{:44} {:>25} {:>25}", "", "rows given", "rows from the rig");
+    println!("{:44}{}", "", format!(" {:>9} {:>7} {:>7}", "median µs", "99 % µs", "memory").repeat(2));
+    for setting in &SETTINGS {
+        let problem = Problem::new(setting);
+        let (given, whole) = (problem.rows_given(), problem.whole());
+        println!("{:44} {given} {whole}", setting.name);
     }
-    let arm = Arm::new(&rig).expect("complete");
-    let mut at = Configuration::default();
-    arm.configure(&places[STEPS], &mut at);
-    let pairs = (0..2).flat_map(|camera| (0..12).map(move |feature| (camera, feature)));
-    let target =
-        |(camera, feature)| Sighting { camera, feature, pixel: arm.pixel(&at, camera, feature).expect("of the rig") };
-    let task = ImagePoints { targets: pairs.map(target).collect(), seen: Vec::new(), sd: 1.0 };
-    let image = InImage { camera: 0, features: (0..6).collect(), margin: 5.0, strength: 10.0 };
-    let limits: &[&dyn Limit] = if visible { &[&image] } else { &[] };
-    let goals = [Goal::new(&task)];
-    let mut stepper = Stepper::default();
-    timed(name, required, |index| {
-        arm.configure(&places[index], &mut at);
-        assert!(!stepper.step(&arm, &at, &goals, limits, 1.0).failed);
-    });
+    println!("{:44} {:>25} {}", "ImageBased, mean matrix, no limit active", "", image_based());
+}
+
+struct Problem {
+    arm: Arm,
+    places: Vec<Vec<f64>>,
+    task: ImagePoints,
+    image: Option<InImage>,
+}
+
+impl Problem {
+    fn new(setting: &Setting) -> Self {
+        let mut rig = random_rig(6, 2, 12, 3);
+        let mut places = positions(&rig, STEPS + 1);
+        for joint in &mut rig.robot.joints {
+            // Wide enough for whole steps.
+            let limits = &mut joint.limits;
+            (limits.lower, limits.upper, limits.velocity) = (Some(-50.0), Some(50.0), Some(setting.speed));
+        }
+        let arm = Arm::new(&rig).expect("complete");
+        let mut at = Configuration::default();
+        arm.configure(&places.pop().expect("asked for"), &mut at);
+        let pairs = (0..2).flat_map(|camera| (0..12).map(move |feature| (camera, feature)));
+        let target = |(camera, feature)| {
+            let pixel = arm.pixel(&at, camera, feature).expect("of the rig");
+            Sighting { camera, feature, pixel }
+        };
+        let task = ImagePoints { targets: pairs.map(target).collect(), seen: Vec::new(), sd: 1.0 };
+        let image = |margin| InImage { camera: 0, features: (0..6).collect(), margin, strength: 10.0 };
+        Problem { arm, places, task, image: setting.margin.map(image) }
+    }
+
+    /// The motion alone.
+    fn rows_given(&self) -> Times {
+        let (mut at, mut solver) = (Configuration::default(), MotionSolver::new(1e-3));
+        let (mut tasks, mut limits, mut bounds) = ([TaskRows::default()], LimitRows::default(), JointBounds::default());
+        Times::of(&self.places, |joints| {
+            self.arm.configure(joints, &mut at);
+            tasks[0].clear(6);
+            self.task.rows(&self.arm, &at, &mut tasks[0]);
+            limits.clear(6);
+            self.image.iter().for_each(|image| image.rows(&self.arm, &at, 1.0, &mut limits));
+            bounds.update(self.arm.limits(), joints, &[0.0; 6], 1.0);
+            let start = (asked(), ThreadTime::now());
+            let step = solver.solve(&tasks, &limits, &bounds);
+            let spent = (asked() - start.0, 1e6 * start.1.elapsed().as_secs_f64());
+            assert!(!step.failed);
+            spent
+        })
+    }
+
+    /// From joints to the motion.
+    fn whole(&self) -> Times {
+        let (mut at, mut stepper) = (Configuration::default(), Stepper::default());
+        let goals = [Goal::new(&self.task)];
+        let limits: Vec<&dyn Limit> = self.image.iter().map(|image| image as &dyn Limit).collect();
+        Times::of(&self.places, |joints| {
+            let start = (asked(), ThreadTime::now());
+            self.arm.configure(joints, &mut at);
+            let step = stepper.step(&self.arm, &at, &goals, &limits, 1.0);
+            let spent = (asked() - start.0, 1e6 * start.1.elapsed().as_secs_f64());
+            assert!(!step.failed);
+            spent
+        })
+    }
 }
 
 /// The same error, measured in place of predicted, with slopes of two configurations.
-fn image_based(name: &str) {
+fn image_based() -> Times {
     let mut rig = random_rig(6, 2, 12, 3);
-    let places = positions(&rig, STEPS + 1);
+    let mut places = positions(&rig, STEPS + 1);
     for joint in &mut rig.robot.joints {
         (joint.limits.lower, joint.limits.upper) = (Some(-50.0), Some(50.0));
     }
@@ -82,27 +123,38 @@ fn image_based(name: &str) {
         let see = |(camera, feature)| Some(Sighting { camera, feature, pixel: arm.pixel(&at, camera, feature)? });
         pairs.filter_map(see).collect()
     };
-    let seen: Vec<Vec<Sighting>> = places.iter().map(|joints| look(joints)).collect();
     let mut servo = ImageBased::new(&rig, ImageSettings::default()).expect("complete");
-    servo.aim(&seen[STEPS]);
-    timed(name, "-", |index| {
-        let step = servo.step(&seen[index], &places[index], &[], 100.0).expect("the features are seen");
+    servo.aim(&look(&places.pop().expect("asked for")));
+    Times::of(&places, |joints| {
+        let seen = look(joints);
+        let start = (asked(), ThreadTime::now());
+        let step = servo.step(&seen, joints, &[], 100.0).expect("the features are seen");
+        let spent = (asked() - start.0, 1e6 * start.1.elapsed().as_secs_f64());
         assert!(!step.failed);
-    });
+        spent
+    })
 }
 
-fn timed(name: &str, required: &str, mut step: impl FnMut(usize)) {
-    let (mut times, mut asked) = (Vec::new(), 0);
-    for index in 0..STEPS {
-        let before = (ASKED.load(Ordering::Relaxed), ThreadTime::now());
-        step(index);
-        let (elapsed, now) = (before.1.elapsed(), ASKED.load(Ordering::Relaxed));
-        // All but the first few.
-        asked = asked.max(if times.len() > 10 { now - before.0 } else { 0 });
-        times.push(1e6 * elapsed.as_secs_f64());
+struct Times {
+    median: f64,
+    slow: f64,
+    /// Most that one step asked for, but for the first 100.
+    asked: usize,
+}
+
+impl Times {
+    fn of(places: &[Vec<f64>], mut step: impl FnMut(&[f64]) -> (usize, f64)) -> Self {
+        let (asked, mut times): (Vec<usize>, Vec<f64>) = places.iter().map(|joints| step(joints)).unzip();
+        times.sort_by(f64::total_cmp);
+        let most = asked[100..].iter().copied().max().unwrap_or(0);
+        Times { median: times[times.len() / 2], slow: times[times.len() * 99 / 100], asked: most }
     }
-    times.sort_by(f64::total_cmp);
-    println!("{name:44} {:>10.1} {:>8.1} {required:>9} {asked:>12}", times[STEPS / 2], times[STEPS * 99 / 100]);
+}
+
+impl std::fmt::Display for Times {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:>9.1} {:>7.1} {:>7}", self.median, self.slow, self.asked)
+    }
 }
 
 fn positions(rig: &Rig, samples: usize) -> Vec<Vec<f64>> {
