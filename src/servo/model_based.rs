@@ -35,13 +35,14 @@ impl ModelBased {
     ///
     /// Errors: [`Error::Unusable`] with the paths of what is missing, or where there is no joint.
     pub fn new(rig: &Rig) -> Result<Self, Error> {
+        let arm = Arm::new(rig)?;
         Ok(ModelBased {
             takes: Takes::default(),
-            arm: Arm::new(rig)?,
+            target: JointTarget { joints: Vec::new(), sd: vec![1.0; arm.joints()] },
+            arm,
             reader: PixelReader::new(rig)?,
             stepper: Stepper::new(0.0),
             at: Configuration::default(),
-            target: JointTarget { joints: Vec::new(), sd: 1.0 },
             goal: Vec::new(),
             expected: Vec::new(),
             held: Vec::new(),

@@ -1,7 +1,7 @@
 //! Where rows of tasks, rows of limits and a box of motions meet.
 use super::joint_bounds::{Bound, JointBounds};
 use super::{LimitRows, TaskRows};
-use handeye_solvers::{Qp, QpEnd, QuadraticProgram};
+use handeye_solvers::{Constraint as Of, Qp, QpEnd, QuadraticProgram};
 use nalgebra::{DMatrix, DVector};
 
 /// Finds motions from rows; kept from step to step. `Send`.
@@ -11,6 +11,9 @@ pub struct MotionSolver {
     /// Share of the squared errors by which H is damped, (1 rad or 1 m)⁻²: where errors are large or the arm is near a singularity,
     /// motions are shorter; near the goal, whole Gauss-Newton steps. 0 takes whole steps always.
     pub damping: f64,
+    /// J by columns, and what is wanted of each row.
+    columns: Vec<f64>,
+    wanted: Vec<f64>,
     hessian: Vec<f64>,
     gradient: Vec<f64>,
     program: QuadraticProgram,
@@ -28,6 +31,9 @@ pub struct Step {
     pub errors: Vec<[f64; 2]>,
     /// What holds the motion back.
     pub active: Vec<Active>,
+    /// Where a limit gave way: constraints that cannot all hold, though without any one of them the others can. Other such sets may
+    /// exist beside it.
+    pub conflict: Vec<Constraint>,
     /// True where numbers were not finite or the program broke down. The motion is 0, or leads back inside the limits.
     pub failed: bool,
 }
@@ -83,6 +89,8 @@ impl MotionSolver {
     pub fn new(damping: f64) -> Self {
         MotionSolver {
             damping,
+            columns: Vec::new(),
+            wanted: Vec::new(),
             hessian: Vec::new(),
             gradient: Vec::new(),
             program: QuadraticProgram::new(0, 0),
@@ -134,6 +142,7 @@ impl MotionSolver {
         self.step.motion.resize(n, 0.0);
         self.step.errors.clear();
         self.step.active.clear();
+        self.step.conflict.clear();
         self.step.failed = false;
     }
 
@@ -157,7 +166,7 @@ impl MotionSolver {
         self.step.motion.copy_from_slice(&found.x);
         self.step.failed = found.end == QpEnd::Failed;
         for (joint, &multiplier) in found.of_box.iter().enumerate().filter(|(_, multiplier)| **multiplier != 0.0) {
-            self.step.active.push(joint_held(bounds, joint, multiplier, multiplier > 0.0));
+            self.step.active.push(held(joint_bound(bounds, joint, multiplier > 0.0), multiplier.abs()));
         }
         for (i, &(limit, row)) in limits.of.iter().enumerate() {
             let (multiplier, slack) = (found.of_rows[i], found.slack[i]);
@@ -165,6 +174,11 @@ impl MotionSolver {
                 self.step.active.push(Active { constraint: Constraint::Limit { limit, row }, multiplier, slack });
             }
         }
+        self.step.conflict.extend(found.conflict.iter().map(|constraint| match *constraint {
+            Of::Upper(joint) => joint_bound(bounds, joint, true),
+            Of::Lower(joint) => joint_bound(bounds, joint, false),
+            Of::Row(i) => Constraint::Limit { limit: limits.of[i].0, row: limits.of[i].1 },
+        }));
     }
 
     /// Of a lower priority: the motion so far plus B z, with the box as rows.
@@ -212,34 +226,35 @@ impl MotionSolver {
             self.step.motion[i] = motion.min(bounds.upper[i]).max(bounds.lower[i]);
         }
         for (i, &multiplier) in found.of_rows.iter().enumerate().filter(|(_, multiplier)| **multiplier > 0.0) {
-            let active = if i < 2 * n {
-                joint_held(bounds, i % n, if i < n { multiplier } else { -multiplier }, i < n)
+            let constraint = if i < 2 * n {
+                joint_bound(bounds, i % n, i < n)
             } else {
                 let (limit, row) = limits.of[i - 2 * n];
-                Active { constraint: Constraint::Limit { limit, row }, multiplier, slack: 0.0 }
+                Constraint::Limit { limit, row }
             };
-            self.step.active.push(active);
+            self.step.active.push(held(constraint, multiplier));
         }
     }
 
     /// H = Jᵀ J + δ I and g = -Jᵀ e of the tasks' rows.
     fn normal_equations(&mut self, n: usize, tasks: &TaskRows) {
+        let m = tasks.len();
+        self.wanted.clear();
+        self.wanted.extend((0..m).map(|row| tasks.wanted(row)));
+        self.columns.clear();
+        (0..n).for_each(|joint| self.columns.extend(tasks.column(joint)));
         self.hessian.clear();
         self.hessian.resize(n * n, 0.0);
         self.gradient.clear();
-        self.gradient.resize(n, 0.0);
-        let mut squares = 0.0;
-        for index in 0..tasks.len() {
-            let ((row, error), wanted) = (tasks.row(index), tasks.wanted(index));
-            squares += error * error;
-            for i in 0..n {
-                self.gradient[i] -= row[i] * wanted;
-                let columns = &mut self.hessian[i * n..i * n + i + 1];
-                columns.iter_mut().zip(row).for_each(|(entry, slope)| *entry += row[i] * slope);
+        for i in 0..n {
+            let column = &self.columns[i * m..(i + 1) * m];
+            self.gradient.push(-long_dot(column, &self.wanted));
+            for j in 0..=i {
+                self.hessian[i * n + j] = long_dot(column, &self.columns[j * m..(j + 1) * m]);
             }
         }
         let largest = (0..n).map(|i| self.hessian[i * n + i]).fold(0.0, f64::max);
-        let damping = self.damping * squares / tasks.len().max(1) as f64 + LEAST * largest;
+        let damping = self.damping * tasks.errors() / m.max(1) as f64 + LEAST * largest;
         for i in 0..n {
             self.hessian[i * n + i] += damping.max(f64::MIN_POSITIVE.sqrt());
             for j in 0..i {
@@ -264,7 +279,21 @@ fn left_open(n: usize, tasks: &TaskRows, before: Option<DMatrix<f64>>) -> DMatri
     before * eigen.eigenvectors.select_columns(&open)
 }
 
-fn joint_held(bounds: &JointBounds, joint: usize, multiplier: f64, upper: bool) -> Active {
+/// In four sums side by side, which a processor adds to at once.
+fn long_dot(a: &[f64], b: &[f64]) -> f64 {
+    let ((a, rest), (b, others)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    let mut sums = [0.0; 4];
+    for (a, b) in a.iter().zip(b) {
+        (0..4).for_each(|k| sums[k] += a[k] * b[k]);
+    }
+    sums.iter().sum::<f64>() + rest.iter().zip(others).map(|(a, b)| a * b).sum::<f64>()
+}
+
+fn joint_bound(bounds: &JointBounds, joint: usize, upper: bool) -> Constraint {
     let bound = if upper { bounds.of_upper[joint] } else { bounds.of_lower[joint] };
-    Active { constraint: Constraint::Joint { joint, bound, upper }, multiplier: multiplier.abs(), slack: 0.0 }
+    Constraint::Joint { joint, bound, upper }
+}
+
+fn held(constraint: Constraint, multiplier: f64) -> Active {
+    Active { constraint, multiplier, slack: 0.0 }
 }

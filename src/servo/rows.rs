@@ -34,8 +34,9 @@ impl TaskRows {
 
     /// Adds a row: `slopes`, one per joint, times the motion shall be `change`. `sd`: standard deviation in their unit.
     pub fn push(&mut self, slopes: impl IntoIterator<Item = f64>, change: f64, sd: f64) {
-        self.jacobian.extend(slopes.into_iter().map(|slope| slope / sd));
-        self.errors.push(change / sd);
+        let weight = 1.0 / sd;
+        self.jacobian.extend(slopes.into_iter().map(|slope| slope * weight));
+        self.errors.push(change * weight);
         self.shares.push(1.0);
         debug_assert_eq!(self.jacobian.len(), self.n * self.errors.len());
     }
@@ -53,6 +54,11 @@ impl TaskRows {
     /// A row over its standard deviation: slopes by the joints, and the change that is wanted.
     pub fn row(&self, i: usize) -> (&[f64], f64) {
         (&self.jacobian[i * self.n..(i + 1) * self.n], self.errors[i])
+    }
+
+    /// Slopes of every row by one joint.
+    pub(super) fn column(&self, joint: usize) -> impl Iterator<Item = f64> {
+        self.jacobian.iter().skip(joint).step_by(self.n.max(1)).copied()
     }
 
     /// What one step shall do of a row's error.

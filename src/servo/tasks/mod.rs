@@ -2,11 +2,13 @@
 mod image_points;
 mod joint_target;
 mod look_at;
+mod manipulability;
 mod tip_pose;
 
 pub use image_points::ImagePoints;
 pub use joint_target::JointTarget;
 pub use look_at::LookAt;
+pub use manipulability::{Manipulability, TipMotion};
 pub use tip_pose::TipPose;
 
 use super::{Arm, Configuration, TaskRows};

@@ -1,8 +1,8 @@
-//! Where the tip may be.
+//! The tip on one side of a plane.
 use super::{Arm, Configuration, Limit, LimitRows, SHARE};
 use nalgebra::Vector3;
 
-/// Keeps the tip's origin on one side of a plane, normal·p ≤ offset; six of them make a box.
+/// Keeps the tip's origin on one side of a plane, normal·p ≤ offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfSpace {
     /// Unit normal in the world, pointing out of where the tip may be.
