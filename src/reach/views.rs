@@ -4,6 +4,7 @@ use crate::recording::Detection;
 use crate::rig::{Camera, Model, ModelCamera, Rig};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
+use std::f64::consts::FRAC_PI_4;
 
 /// Cosine of the largest angle by which a pixel's own direction may differ from the feature's: where a distortion has
 /// folded back, a feature outside the image seems to be inside, and the two differ by far more.
@@ -14,7 +15,26 @@ pub(crate) struct Views<'a> {
     pub model: &'a Model,
     sizes: Vec<[f64; 2]>,
     pub need: Need,
+    /// For every feature, in its parent's frame, where cameras have to be to see it; `None` where that is everywhere.
+    cones: Vec<Option<Cone>>,
 }
+
+/// Directions about an axis.
+#[derive(Clone, Copy, Debug)]
+struct Cone {
+    axis: Vector3<f64>,
+    /// Cosine of the largest angle from the axis.
+    cosine: f64,
+}
+
+/// Share of the largest angle at which a feature was seen that is counted on.
+const COUNTED_ON: f64 = 0.8;
+
+/// Steps towards the axis of a cone: it is off by the inverse of their number at most, in radii.
+const STEPS: u32 = 100;
+
+/// An angle at which a feature is seen that is seen at all [rad].
+const FACING: f64 = FRAC_PI_4;
 
 /// How many features have to be in view.
 #[derive(Clone, Copy, Debug, Default)]
@@ -43,7 +63,25 @@ impl<'a> Views<'a> {
                 return Err(Error::Unusable(format!("the rig has no {what}, so nothing would be seen")));
             }
         }
-        Ok(Views { model, sizes: sizes(rig)?, need })
+        Ok(Views { model, sizes: sizes(rig)?, need, cones: vec![None; rig.features.len()] })
+    }
+
+    /// The same where features are seen from the side from which they were seen before, such as the front of a board.
+    /// `seen`: camera, feature and the joints of the moment.
+    pub fn facing<'b>(mut self, seen: impl Iterator<Item = (usize, usize, &'b [f64])>) -> Self {
+        let mut sides = vec![Vec::new(); self.cones.len()];
+        seen.for_each(|(camera, feature, joints)| {
+            sides[feature].push(self.side(camera, feature, &self.model.links(joints)));
+        });
+        self.cones = sides.iter().map(|sides| Cone::around(sides)).collect();
+        self
+    }
+
+    /// Direction of a camera from a feature, in the feature's parent's frame.
+    fn side(&self, camera: usize, feature: usize, links: &[Pose]) -> Vector3<f64> {
+        let (lens, point) = (&self.model.cameras[camera], &self.model.features[feature]);
+        let centre = self.model.carrier(lens.parent, links).transform(&lens.pose.translation);
+        (self.model.carrier(point.parent, links).inverse_transform(&centre) - point.xyz).normalize()
     }
 
     /// Exact pixels of all features in view, ordered by camera, then by the rig's features.
@@ -86,7 +124,24 @@ impl<'a> Views<'a> {
     /// Where a camera sees a feature, if it does.
     fn pixel(&self, camera: usize, feature: usize, links: &[Pose]) -> Option<[f64; 2]> {
         let point = self.model.in_camera(camera, feature, links);
-        pixel_inside(&self.model.cameras[camera], self.sizes[camera], &point)
+        let pixel = pixel_inside(&self.model.cameras[camera], self.sizes[camera], &point)?;
+        let shows = |cone: Cone| self.side(camera, feature, links).dot(&cone.axis) >= cone.cosine;
+        self.cones[feature].is_none_or(shows).then_some(pixel)
+    }
+}
+
+impl Cone {
+    /// The narrowest cone around directions, by steps towards the farthest (Badoiu and Clarkson 2003), and a share of its width;
+    /// `None` of directions that are on no one side.
+    fn around(sides: &[Vector3<f64>]) -> Option<Cone> {
+        let mut axis = sides.iter().sum::<Vector3<f64>>().try_normalize(f64::EPSILON)?;
+        let farthest = |axis: &Vector3<f64>| sides.iter().min_by(|a, b| a.dot(axis).total_cmp(&b.dot(axis)));
+        for step in 1..=STEPS {
+            let way = farthest(&axis)? - axis;
+            axis = (axis + way / f64::from(1 + step)).try_normalize(f64::EPSILON)?;
+        }
+        let least = farthest(&axis)?.dot(&axis);
+        (least > 0.0).then(|| Cone { axis, cosine: (COUNTED_ON * least.acos()).max(FACING).cos() })
     }
 }
 

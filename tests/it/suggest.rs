@@ -7,7 +7,9 @@ use handeye::chain::JointKind;
 use handeye::recording::Recording;
 use handeye::rig::{Limits, Model, Rig};
 use handeye::simulate::random_rig;
+use nalgebra::Vector3;
 use serde_json::Value;
+use std::f64::consts::{PI, TAU};
 use visits::{gauge_alone, in_view, tip_error, visit};
 
 #[path = "../../benches/common/visits.rs"]
@@ -148,7 +150,7 @@ fn every_kind_of_rig_gets_what_is_said_inside_its_limits_and_in_view() {
                     assert!((lower..=upper).contains(value), "{name}: {value} beyond {lower} to {upper}");
                 }
                 let seen = in_view(&model, &learned, &sample.joints);
-                assert_eq!(seen.len(), sample.in_view, "{name}");
+                assert!((1..=seen.len()).contains(&sample.in_view), "{name}: {} of {}", sample.in_view, seen.len());
                 let of_camera = |camera: usize| seen.iter().filter(|one| one.0 == camera).count();
                 let most = (0..truth.cameras.len()).map(of_camera).max().unwrap();
                 assert!(2 * most >= truth.features.len(), "{name}: {most} features in view");
@@ -167,6 +169,47 @@ fn every_kind_of_rig_gets_what_is_said_inside_its_limits_and_in_view() {
     }
 }
 
+/// Features on the front of a board, which shows up to 70 degrees from its normal.
+#[test]
+fn nobody_is_sent_to_see_the_back_of_a_board() {
+    let normal = Vector3::new(-0.3, 0.0, 1.0).normalize();
+    let mut hidden = 0;
+    for seed in 1..=5 {
+        let truth = variants::planar(2, seed);
+        let model = Model::new(&truth).unwrap();
+        let shows = |joints: &[f64], camera: usize, feature: usize| {
+            let centre = model.cameras[camera].pose.translation;
+            let side = model.tip(joints).inverse_transform(&centre) - model.features[feature].xyz;
+            side.normalize().dot(&normal) > 70_f64.to_radians().cos()
+        };
+        let mut recording = record(&truth, 60, seed);
+        let names = recording.features.clone();
+        let feature = |place: u32| truth.features.iter().position(|one| one.name == names[place as usize]).unwrap();
+        for sample in &mut recording.samples {
+            let joints = sample.joints.clone().unwrap();
+            sample.pixels.retain(|seen| shows(&joints, seen.camera as usize, feature(seen.feature)));
+        }
+        let start = variants::nominal(&truth);
+        let learned = learn(&start, &recording).unwrap().rig;
+        let blind_to = |recording: Option<&Recording>| {
+            let found = ask(&learned, recording, Some(&start), 5).unwrap();
+            let sees_enough = |joints: &Vec<f64>| {
+                let seen = in_view(&model, &truth, joints);
+                let of_camera = |camera| {
+                    let shown = seen.iter().filter(|one| one.0 == camera && shows(joints, camera, one.1));
+                    // Half were expected; one or two may be at an edge of the image.
+                    3 * shown.count() >= truth.features.len()
+                };
+                (0..truth.cameras.len()).any(of_camera)
+            };
+            found.samples.iter().filter(|sample| !sees_enough(&sample.joints)).count()
+        };
+        assert_eq!(blind_to(Some(&recording)), 0, "seed {seed}");
+        hidden += blind_to(None);
+    }
+    assert!(hidden > 0, "the fixture hides nothing");
+}
+
 #[test]
 fn without_limits_joints_stay_where_they_were_while_the_rig_was_learned() {
     let truth = random_rig(6, 2, 12, 3);
@@ -176,6 +219,23 @@ fn without_limits_joints_stay_where_they_were_while_the_rig_was_learned() {
     for sample in ask(&learned, Some(&recording), None, 5).unwrap().samples {
         for (value, [least, most]) in sample.joints.iter().zip(ranges) {
             assert!((least..=most).contains(&value), "{value} outside {least} to {most}");
+        }
+    }
+}
+
+/// A UR5 turns each joint twice round; where it is sent, it need not unwind first.
+#[test]
+fn joints_are_not_sent_a_whole_turn_away() {
+    let mut truth = variants::ur5(1);
+    let recording = record(&truth, 20, 1);
+    for joint in &mut truth.robot.joints {
+        (joint.limits.lower, joint.limits.upper) = (Some(-TAU), Some(TAU));
+    }
+    let learned = learn(&limits_known(&truth), &recording).unwrap().rig;
+    let ranges = &learned.fit.as_ref().unwrap().joints;
+    for sample in ask(&learned, Some(&recording), None, 4).unwrap().samples {
+        for (value, [least, most]) in sample.joints.iter().zip(ranges) {
+            assert!((value - 0.5 * (least + most)).abs() <= PI + 1e-9, "{value} beside {least} to {most}");
         }
     }
 }

@@ -4,21 +4,22 @@ use super::super::direction::Direction;
 use super::super::evaluate::median;
 use super::super::gauge;
 use super::super::graph::{Built, Freedom, State};
-use super::super::numbers::Numbers;
+use super::super::numbers::{Numbers, Part};
 use super::super::outliers::Verdict;
 use crate::Error;
 use handeye_solvers::{Covariance, Solver, WeakDirection};
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 
 /// A Gaussian belief about the free numbers of a rig, and the positions of the tip that it is judged by.
 #[derive(Clone, Debug)]
 pub(super) struct Knowledge {
     /// Covariance of the numbers; what only priors determine counts as known, for no motion changes it.
     sigma: DMatrix<f64>,
-    /// Σ M Σ, with M the mean of Jᵀ J over the workspace: tr(M Σ) is the mean variance of the tip.
+    /// F of M = F Fᵀ, the mean of Jᵀ J over the workspace: tr(M Σ) is the mean variance of the tip. Of the numbers that move the tip,
+    /// which come first.
+    root: DMatrix<f64>,
+    /// Σ F.
     spread: DMatrix<f64>,
-    /// M.
-    mean: DMatrix<f64>,
     /// J: how the tip moves with the numbers, 3 rows for every position of the workspace.
     tips: Vec<DMatrix<f64>>,
 }
@@ -76,13 +77,18 @@ fn of_direction(honest: &Honest<'_>, built: &Built, numbers: &Numbers, weak: &We
 impl Knowledge {
     /// `tips`: how the tip moves with the numbers, at positions of the workspace.
     pub fn new(uncertainty: &Uncertainty, tips: Vec<DMatrix<f64>>) -> Self {
-        let n = uncertainty.numbers.len;
+        let moving = |(part, _): &(Part, usize)| matches!(part, Part::Base | Part::Chain);
+        let n = uncertainty.numbers.iter().take_while(moving).count();
         let mut mean = DMatrix::zeros(n, n);
-        tips.iter().for_each(|tip| mean.gemm_tr(1.0 / tips.len() as f64, tip, tip, 1.0));
+        for tip in tips.iter().map(|tip| tip.columns(0, n)) {
+            mean.gemm_tr(1.0 / tips.len() as f64, &tip, &tip, 1.0);
+        }
+        let SymmetricEigen { eigenvalues, eigenvectors: mut root } = mean.symmetric_eigen();
+        root.column_iter_mut().zip(&eigenvalues).for_each(|(mut column, value)| column *= value.max(0.0).sqrt());
         let mut sigma = uncertainty.sigma.clone();
         uncertainty.by_priors.iter().for_each(|v| sigma.ger(-1.0, v, v, 1.0));
-        let spread = &sigma * &mean * &sigma;
-        Knowledge { sigma, spread, mean, tips }
+        let spread = sigma.columns(0, n) * &root;
+        Knowledge { sigma, root, spread, tips }
     }
 
     /// Standard deviation of the tip: median over the workspace.
@@ -90,20 +96,19 @@ impl Knowledge {
         median_deviation(&self.tips, &self.sigma)
     }
 
-    /// By how much detections would lower the mean variance of the tip: tr(S⁻¹ A Σ M Σ Aᵀ) with S = I + A Σ Aᵀ, for whitened
-    /// detections whose derivatives by the numbers are the rows of A.
+    /// By how much detections would lower the mean variance of the tip: tr(S⁻¹ A Σ M Σ Aᵀ) = |L⁻¹ A Σ F|² with S = I + A Σ Aᵀ = L Lᵀ,
+    /// for whitened detections whose derivatives by the numbers are the rows of A.
     pub fn gain(&self, rows: &DMatrix<f64>) -> f64 {
-        let Some(innovation) = self.innovation(rows) else { return 0.0 };
-        innovation.solve(&(rows * &self.spread * rows.transpose())).trace()
+        let solved = self.innovation(rows).and_then(|s| s.l().solve_lower_triangular(&(rows * &self.spread)));
+        solved.map_or(0.0, |solved| solved.norm_squared())
     }
 
     /// Takes detections in: Σ - Σ Aᵀ S⁻¹ A Σ.
     pub fn learn(&mut self, rows: &DMatrix<f64>) {
-        let Some(innovation) = self.innovation(rows) else { return };
-        let seen = rows * &self.sigma;
-        if let Some(w) = innovation.l().solve_lower_triangular(&seen) {
+        let solved = self.innovation(rows).and_then(|s| s.l().solve_lower_triangular(&(rows * &self.sigma)));
+        if let Some(w) = solved {
             self.sigma.gemm_tr(-1.0, &w, &w, 1.0);
-            self.spread = &self.sigma * &self.mean * &self.sigma;
+            self.spread = self.sigma.columns(0, self.root.nrows()) * &self.root;
         }
     }
 

@@ -10,6 +10,7 @@ use super::setup::Setup;
 use super::stage::{Stage, Stages};
 use super::{Fitted, LAST, fit, gauge, is_of_targets};
 use crate::Error;
+use crate::chain::JointKind;
 use crate::reach::{Motions, Need, Views, range};
 use crate::recording::Recording;
 use crate::rig::{Fit, Rig};
@@ -21,6 +22,7 @@ use rayon::prelude::*;
 use sight::Sight;
 use stand_in::{Data, stand_in};
 use std::borrow::Cow;
+use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
 /// Random positions that are compared, and in which the tip is judged.
@@ -94,7 +96,7 @@ pub struct SuggestedSample {
 /// had it; `None` is nothing but what `[estimate]` holds or knows roughly.
 ///
 /// Positions are within the limits of the joints, else within the range that they were in while the rig was learned, and have at
-/// least half of the features in view of a camera. The greedy choice minimises the expected variance of the tip over such
+/// least half of the features in view of a camera; with the recording, from the side from which they were seen. The greedy choice minimises the expected variance of the tip over such
 /// positions (A-optimality). Nothing is known of obstacles.
 ///
 /// Errors: [`Error::Unusable`] where the rig was not learned, or nothing of it that moves the tip was, or rig and recording do not fit
@@ -138,17 +140,24 @@ pub fn suggest(
     let honest = Honest::new(&stages, &last, &state, &verdict);
     let uncertainty = Uncertainty::new(&honest, &freedom, &state, &verdict)?;
 
-    let views = Views::new(&setup.rig, &state.model, need(&setup.rig))?;
+    let mut views = Views::new(&setup.rig, &state.model, need(&setup.rig))?;
+    if !stood_in {
+        let used = setup.observations.iter().zip(&verdict.active).filter(|(_, active)| **active).map(|(seen, _)| seen);
+        views = views.facing(used.map(|seen| (seen.camera, seen.feature, &state.joints[seen.sample][..])));
+    }
     let sight = Sight::new(&honest, &uncertainty.numbers, &state, &verdict, &views, thinned);
     let mut motions = Motions::new(&setup.rig, &views, ranges(&setup.rig, fit_of)?, stream(options.seed, POSITIONS));
     let pool = (0..POOL).map(|_| motions.draw()).collect::<Result<Vec<_>, _>>()?;
     let tips: Vec<DMatrix<f64>> = pool.iter().map(|joints| sight.tip(joints)).collect();
     let with_priors = median_deviation(&tips, &uncertainty.sigma);
     let now = Knowledge::new(&uncertainty, tips);
+    let deviation = now.tip();
+    let mut samples = choose(now, &sight, &mut motions, &pool, options);
+    samples.iter_mut().for_each(|sample| turn_back(&mut sample.joints, &setup.rig, fit_of));
     Ok(Suggestion {
-        now: now.tip(),
+        now: deviation,
         with_priors,
-        samples: choose(now, &sight, &mut motions, &pool, options),
+        samples,
         metric: gauge::length_is_known(&setup),
         learned_from: fit_of.samples,
         stood_in,
@@ -165,6 +174,17 @@ fn need(rig: &Rig) -> Need {
 fn ranges(rig: &Rig, fit: &Fit) -> Result<Vec<[f64; 2]>, Error> {
     let joints = rig.robot.joints.iter().enumerate();
     joints.map(|(index, joint)| range(joint, fit.joints.get(index).copied())).collect()
+}
+
+/// Brings revolute joints back by whole turns to near where they were while the rig was learned, where their limits permit it.
+fn turn_back(joints: &mut [f64], rig: &Rig, fit: &Fit) {
+    for ((value, joint), [least, most]) in joints.iter_mut().zip(&rig.robot.joints).zip(&fit.joints) {
+        let [lower, upper] = [joint.limits.lower.unwrap_or(*least), joint.limits.upper.unwrap_or(*most)];
+        let turned = *value - TAU * ((*value - 0.5 * (least + most)) / TAU).round();
+        if joint.kind == JointKind::Revolute && (lower..=upper).contains(&turned) {
+            *value = turned;
+        }
+    }
 }
 
 /// Random numbers of their own for every purpose.
