@@ -18,8 +18,8 @@ const UNLIKELY: f64 = 3.0;
 /// Answers whose pixels differ from the target's by less than this more than the best are as near [px].
 const AS_NEAR: f64 = 1e-3;
 
-/// A rig that is off explains no pixels exactly, and its best branch may be a far one: joints nearby do that leave this many times the
-/// distances of the best.
+/// A rig that is off explains no pixels exactly, and its best branch may be a far one: joints that leave this many times the pixel
+/// distances of the best are about as good.
 const AS_GOOD: f64 = 2.0;
 
 impl PixelReader {
@@ -50,12 +50,14 @@ impl PixelReader {
         best.ok_or_else(|| Error::NotEnoughData("no joints lead to the pixels that are aimed at".to_owned()))
     }
 
-    /// The joints that the pixels aimed at lead to from some joints [rad or m], or else [`PixelReader::joints_aimed_at`].
+    /// The same for a rig that may be off: also the joints that the pixels lead to from where the arm is, where they are nearer and about as
+    /// good.
     pub fn joints_on_the_way(&mut self, goal: &[Sighting], from: &[f64]) -> Result<Vec<f64>, Error> {
         let best = self.joints_aimed_at(goal, from)?;
-        let local = self.inference.joints_near(goal, &Prior::start(from));
-        let as_good = local.ok().filter(|local| local.rms_px <= AS_GOOD * best.rms_px + AS_NEAR);
-        Ok(as_good.unwrap_or(best).joints)
+        let local = self.inference.joints_near(goal, &Prior::start(from)).ok();
+        let is_better =
+            |local: &Branch| local.rms_px <= AS_GOOD * best.rms_px + AS_NEAR && away(local, from) < away(&best, from);
+        Ok(local.filter(is_better).unwrap_or(best).joints)
     }
 
     /// Brings a configuration to the present joints: as they are read, or, to `infer`, from what is seen near the readings; where that does

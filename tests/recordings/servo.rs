@@ -1,6 +1,5 @@
 //! Servoing on the problems that ViSP was measured on: at its best, it takes 7 steps to 1 px.
 use crate::shared;
-use handeye::infer::Sighting;
 use handeye::servo::{Arm, ImageBased, ImageSettings, ModelBased};
 use servo_cases::{Cases, mean, mean_error};
 
