@@ -27,7 +27,7 @@ pub struct Servo {
     /// The rig that the controller knows: a file in which every value is given, or the name of a shipped rig
     #[arg(value_name = "LEARNED")]
     rig: PathBuf,
-    /// A scene file, or the name of a shipped scene (ur5-reach, ur5-noisy)
+    /// A scene file, or the name of a shipped scene (ur5-reach, ur5-visual, ur5-noisy)
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
     /// Seed of all noise, in place of the scene's

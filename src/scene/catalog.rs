@@ -3,5 +3,6 @@
 /// Name and scene file of every shipped scene.
 pub const ALL: &[(&str, &str)] = &[
     ("ur5-reach", include_str!("../../models/scenes/ur5-reach.toml")),
+    ("ur5-visual", include_str!("../../models/scenes/ur5-visual.toml")),
     ("ur5-noisy", include_str!("../../models/scenes/ur5-noisy.toml")),
 ];

@@ -3,6 +3,7 @@ mod catalog;
 mod plot;
 mod read;
 mod read_control;
+mod read_limits;
 mod run;
 
 pub use catalog::ALL;
@@ -10,6 +11,7 @@ pub use plot::svg;
 pub use run::{Moment, Run, run};
 
 use crate::rig::Rig;
+use crate::servo::limits::Guide;
 use crate::servo::{ImageSettings, LoopSettings, PoseSettings, Takes};
 use crate::simulate::world::WorldOptions;
 use nalgebra::Vector3;
@@ -86,4 +88,8 @@ pub enum LimitKind {
     TipSpeed(f64),
     /// The tip on one side of a plane: unit normal, and its distance from the world's origin [m].
     HalfSpace(Vector3<f64>, f64),
+    /// The tip inside a box along the world's axes, from its smallest to its largest coordinates [m].
+    TipBox(Vector3<f64>, Vector3<f64>),
+    /// The tip within a distance of a line or a plane [m].
+    Follow(Guide, f64),
 }

@@ -1,13 +1,13 @@
 //! Reading scene files, with a place for every mistake.
 use super::read_control::read_control;
-use super::{Control, LimitKind, Scene, Target};
+use super::read_limits::read_limits;
+use super::{Control, Scene, Target};
 use crate::Error;
 use crate::rig::read::document::{Fields, Node, Source, parse};
 use crate::rig::read::noise::read_pose_noise;
 use crate::rig::{Rig, catalog, read::read_text};
 use crate::servo::{LoopSettings, Takes};
 use crate::simulate::world::{Execution, Tracker, WorldOptions};
-use nalgebra::Vector3;
 use std::path::Path;
 
 impl Scene {
@@ -156,26 +156,6 @@ fn read_tracker(fields: &Fields) -> Result<(Tracker, f64), Error> {
         }
     })?;
     Ok((tracker, missed.unwrap_or(0.0)))
-}
-
-fn read_limits(node: Node) -> Result<Vec<(String, LimitKind)>, Error> {
-    let fields = node.table(&["in_image", "pixel_speed", "tip_speed", "half_spaces"])?.labelled("limits");
-    let mut limits = Vec::new();
-    let mut add = |name: &str, kind: Option<LimitKind>| limits.extend(kind.map(|kind| (name.to_owned(), kind)));
-    add("in_image", fields.optional("in_image", Node::number)?.map(LimitKind::InImage));
-    add("pixel_speed", fields.optional("pixel_speed", Node::positive)?.map(LimitKind::PixelSpeed));
-    add("tip_speed", fields.optional("tip_speed", Node::positive)?.map(LimitKind::TipSpeed));
-    for entry in fields.optional("half_spaces", Node::list)?.unwrap_or_default() {
-        let plane = entry.table(&["name", "normal", "offset"])?;
-        let need = |key: &str| plane.field(key).ok_or_else(|| plane.error(format!("has no `{key}`")));
-        let normal = need("normal")?;
-        let direction = Vector3::from(normal.value.numbers::<3>()?);
-        let unit = direction.try_normalize(0.0).ok_or_else(|| normal.value.error("is of length 0"))?;
-        let name = need("name")?.value.text()?;
-        // The plane stays where it is when its normal is made of unit length.
-        add(name, Some(LimitKind::HalfSpace(unit, need("offset")?.value.number()? / direction.norm())));
-    }
-    Ok(limits)
 }
 
 fn read_settings(node: Node) -> Result<LoopSettings, Error> {

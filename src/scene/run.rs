@@ -4,12 +4,13 @@ use crate::Error;
 use crate::infer::{Names, Sighting};
 use crate::recording::{Detection, Recording, Sample};
 use crate::rig::Rig;
-use crate::servo::limits::{HalfSpace, InImage, PixelSpeed, TipSpeed};
+use crate::servo::limits::{HalfSpace, InImage, PixelSpeed, TipBox, TipSpeed, VirtualFixture};
 use crate::servo::{
     Active, Command, Controller, ImageBased, Limit, LoopSettings, Measurement, ModelBased, ModelBasedTip, PoseBased,
     ServoLoop, Stop, Takes,
 };
 use crate::simulate::world::World;
+use handeye_solvers::Pose;
 use std::ops::ControlFlow;
 
 /// What happened in a scene.
@@ -182,6 +183,12 @@ impl Scene {
                 }),
                 LimitKind::TipSpeed(speed) => add(Box::new(TipSpeed { speed, strength: STRENGTH })),
                 LimitKind::HalfSpace(normal, offset) => add(Box::new(HalfSpace { normal, offset, strength: STRENGTH })),
+                LimitKind::TipBox(low, high) => {
+                    add(Box::new(TipBox { frame: Pose::identity(), low, high, strength: STRENGTH }));
+                }
+                LimitKind::Follow(guide, tolerance) => {
+                    add(Box::new(VirtualFixture { guide, tolerance, strength: STRENGTH }));
+                }
             }
         }
         limits

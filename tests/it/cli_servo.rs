@@ -79,6 +79,27 @@ fn image_based_and_pose_based_controllers_run_with_their_settings_and_without_jo
 }
 
 #[test]
+fn every_limit_of_scenes_leaves_the_way_to_a_target_inside_of_it() {
+    let folder = Folder::new("servo-limits");
+    let limits = "[limits]\nin_image = 2.0\npixel_speed = 400\ntip_speed = 1.0\ntip_box = { low = [-2, -2, -1], high = [2, 2, 2] }\n\
+                  follow_plane = { point = [0, 0, 0], normal = [0, 0, 1], tolerance = 2.0 }\n\
+                  follow_line = { point = [0, 0, 0], direction = [0, 0, 1], tolerance = 3.0 }\n[loop]\nwindow = 30\n";
+    folder.write("scene.toml", &format!("{SCENE}{limits}"));
+    let (text, _) = folder.expect(0, "servo ur5 scene.toml");
+    assert!(text.lines().last().unwrap().starts_with("converged"), "{text}");
+    // Each of them blocks where the target is outside.
+    for (name, limit) in [
+        ("tip_box", "tip_box = { low = [-2, -2, -1], high = [-1.5, 2, 2] }"),
+        ("follow_plane", "follow_plane = { point = [0, 0, 2], normal = [0, 0, 1], tolerance = 0.01 }"),
+        ("follow_line", "follow_line = { point = [0, 2, 0], direction = [1, 0, 0], tolerance = 0.01 }"),
+    ] {
+        folder.write("scene.toml", &format!("{SCENE}[limits]\n{limit}\n[loop]\nwindow = 30\ndiverged = 100\n"));
+        let (_, complaint) = folder.expect(1, "servo ur5 scene.toml");
+        assert!(complaint.contains("blocked at") && complaint.contains(&format!("limit `{name}`")), "{complaint}");
+    }
+}
+
+#[test]
 fn the_same_seed_gives_the_same_run_and_another_seed_another() {
     let folder = Folder::new("servo-seeds");
     let run = |seed: u64| folder.expect(0, &format!("servo ur5 ur5-noisy --json --seed {seed}")).0;
@@ -157,6 +178,11 @@ fn what_is_wrong_with_a_scene_is_said_with_its_place_and_what_would_do() {
             "[robot]\nstart=[0]\n[target]\njoints=[0]\n[controller]\nkind = \"pose-based\"\ngain = { near = 1.0, far = 2.0, slope = 1.0 }\n",
             "scene.toml:7:28: controller: `gain`: `far`: must be at most 1, found 2",
         ),
+        ("[robot]\nstart=[0]\n[target]\njoints=[0]\n[limits]\ntip_box={ low=[0,0,0] }\n", "`tip_box`: has no `high`"),
+        (
+            "[robot]\nstart=[0]\n[target]\njoints=[0]\n[limits]\nfollow_line={ point=[0,0,0], direction=[0,0,0], tolerance=1 }\n",
+            "`direction`: is of length 0",
+        ),
         ("dt = 0\n[robot]\nstart=[0]\n[target]\njoints=[0]\n", "scene.toml:1:6: `dt`: must be above 0, found 0"),
     ];
     for (text, message) in cases {
@@ -172,7 +198,8 @@ fn what_is_wrong_with_a_scene_is_said_with_its_place_and_what_would_do() {
     assert!(complaint.contains("at most 1000000 are run"), "{complaint}");
     let (_, complaint) = folder.expect(2, "servo ur5 nowhere");
     assert!(
-        complaint.contains("nowhere: neither a scene file nor a shipped scene (known: ur5-reach, ur5-noisy)"),
+        complaint
+            .contains("nowhere: neither a scene file nor a shipped scene (known: ur5-reach, ur5-visual, ur5-noisy)"),
         "{complaint}"
     );
     assert_eq!(folder.names(), ["scene.toml"], "a failed run writes nothing");
