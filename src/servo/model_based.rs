@@ -62,7 +62,7 @@ impl ModelBased {
     /// Errors: [`Error::NotEnoughData`] where the pixels seen or aimed at lead to no joints; [`Error::Unusable`] where `near` is not of
     /// the rig.
     pub fn step(&mut self, seen: &[Sighting], near: &[f64], limits: &[&dyn Limit], dt: f64) -> Result<&Step, Error> {
-        let now = self.reader.joints_seen(seen, near)?;
+        let now = self.reader.joints_seen_or_near(seen, near)?;
         if self.target.joints.is_empty() {
             let found = self.reader.joints_aimed_at(&self.goal, &now.joints)?;
             self.held = self.out_of_reach(&found);

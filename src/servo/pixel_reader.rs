@@ -36,6 +36,18 @@ impl PixelReader {
         nearest.ok_or_else(|| Error::NotEnoughData("no joints explain what was seen".to_owned()))
     }
 
+    /// The same for an arm that noise may have put a little outside its limits, where no joints explain what is seen: those inside that come
+    /// nearest to it.
+    pub fn joints_seen_or_near(&mut self, seen: &[Sighting], near: &[f64]) -> Result<Branch, Error> {
+        match self.joints_seen(seen, near) {
+            Err(Error::NotEnoughData(why)) if !near.is_empty() => {
+                let local = self.inference.joints_near(seen, &Prior::start(near))?;
+                if local.open.is_empty() { Ok(local) } else { Err(Error::NotEnoughData(why)) }
+            }
+            found => found,
+        }
+    }
+
     /// The joints that come nearest to the pixels aimed at, also where they are out of reach; of those that come as near, the ones nearest
     /// to some joints [rad or m].
     pub fn joints_aimed_at(&mut self, goal: &[Sighting], near: &[f64]) -> Result<Branch, Error> {

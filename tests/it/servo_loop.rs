@@ -298,3 +298,24 @@ fn a_target_that_moves_is_followed_at_the_distance_of_one_step() {
         assert!(furthest < 1e-6, "{furthest}");
     }
 }
+
+/// An arm that stands a little outside its limits is led to a target inside: what it sees, no joints inside explain.
+#[test]
+fn an_arm_outside_its_limits_is_led_back_and_to_the_target() {
+    let (rig, places) = rig_and_places(20);
+    for [start, target] in &places {
+        let mut outside = start.clone();
+        for (joint, limits) in outside.iter_mut().zip(rig.robot.joints.iter().map(|joint| joint.limits)) {
+            *joint = if *joint > 0.5 * (limits.lower.unwrap() + limits.upper.unwrap()) {
+                limits.upper.unwrap() + 0.02
+            } else {
+                limits.lower.unwrap() - 0.02
+            };
+        }
+        let mut world = World::new(&unlimited(&rig), &outside, WorldOptions::default()).unwrap();
+        let mut servo = ServoLoop::new(ModelBased::new(&rig).unwrap(), settings());
+        servo.aim(&goal(&world, &Names::new(&rig, world.header()), target));
+        let (stop, moved) = run(&mut world, &rig, &mut servo, &[]).unwrap();
+        assert!(matches!(stop, Stop::Converged { .. }) && moved <= 9, "{stop:?} after {moved}");
+    }
+}
