@@ -19,6 +19,8 @@ struct Setting {
     outliers: f64,
     /// Whether the recording's header is silent on intrinsics.
     guess: bool,
+    /// Whether depth cameras give points alone.
+    points_alone: bool,
     /// What is known of the true rig.
     known: fn(&Rig) -> Rig,
     /// Held-out rms over the floor, and how many of 100 seeds must be within it.
@@ -32,11 +34,12 @@ const PLAIN: Setting = Setting {
     missed: 0.0,
     outliers: 0.0,
     guess: false,
+    points_alone: false,
     known: variants::forgotten,
     bar: (1.05, 99),
 };
 
-const SETTINGS: [Setting; 20] = [
+const SETTINGS: [Setting; 23] = [
     Setting { name: "six50", ..PLAIN },
     Setting { name: "six30", samples: 30, bar: (1.10, 95), ..PLAIN },
     Setting { name: "seven", rig: |seed| random_rig(7, 3, 12, seed), samples: 80, missed: 1.0 / 3.0, ..PLAIN },
@@ -57,6 +60,15 @@ const SETTINGS: [Setting; 20] = [
     Setting { name: "twists-held", known: variants::twists_held, ..PLAIN },
     Setting { name: "nominal", rig: variants::ur5, known: variants::nominal, ..PLAIN },
     Setting { name: "structure", known: variants::structure, ..PLAIN },
+    Setting { name: "depth", rig: |seed| variants::depth(1, seed), points_alone: true, bar: (1.05, 95), ..PLAIN },
+    Setting {
+        name: "depth-colour",
+        rig: |seed| variants::depth(2, seed),
+        points_alone: true,
+        bar: (1.05, 95),
+        ..PLAIN
+    },
+    Setting { name: "rgbd", rig: |seed| variants::depth(1, seed), bar: (1.05, 95), ..PLAIN },
 ];
 
 fn main() {
@@ -101,7 +113,7 @@ fn main() {
     }
 }
 
-/// Held-out rms over the floor, infinite where nothing was learned.
+/// Held-out rms over the floor, of pixels or of points where these are further above theirs; infinite where nothing was learned.
 fn run(setting: &Setting, seed: u64, verbose: bool) -> f64 {
     let truth = (setting.rig)(seed);
     let record = |samples, seed, missed, outliers| {
@@ -109,7 +121,11 @@ fn run(setting: &Setting, seed: u64, verbose: bool) -> f64 {
         simulate(&truth, &options).expect("the rig is complete and in view").recording
     };
     let mut training = record(setting.samples, 2 * seed, setting.missed, setting.outliers);
-    let fresh = record(100, 2 * seed + 1, 0.0, 0.0);
+    let mut fresh = record(100, 2 * seed + 1, 0.0, 0.0);
+    if setting.points_alone {
+        variants::points_alone(&truth, &mut training);
+        variants::points_alone(&truth, &mut fresh);
+    }
     let forgotten = (setting.known)(&truth);
     if setting.guess {
         for camera in &mut training.cameras {
@@ -124,7 +140,9 @@ fn run(setting: &Setting, seed: u64, verbose: bool) -> f64 {
                 println!("training rms {}", learned.report.rms_px);
             }
             let evaluation = evaluate(&learned.rig, &fresh).expect("the learned rig is complete");
-            evaluation.total.rms_px / (truth.noise.pixels * 2.0_f64.sqrt())
+            let of_pixels = evaluation.total.rms_px / (truth.noise.pixels * 2.0_f64.sqrt());
+            let of_points = evaluation.total.points.rms_m / (truth.noise.points * 3.0_f64.sqrt());
+            of_pixels.max(of_points)
         }
         Err(error) => {
             println!("    seed {seed}: {error}");

@@ -1,5 +1,6 @@
 //! Rigs of other kinds than the plain random arm with cameras in the world.
 use handeye::chain::{Convention, JointKind};
+use handeye::recording::{RecordedCamera, Recording};
 use handeye::rig::{Estimate, Model, Parent, Rig, catalog};
 use handeye::simulate::random_rig;
 use handeye::solvers::Pose;
@@ -152,4 +153,20 @@ fn home(rig: &Rig) -> Vec<f64> {
     let middle =
         |joint: &handeye::rig::Joint| 0.5 * (joint.limits.lower.unwrap_or(0.0) + joint.limits.upper.unwrap_or(0.0));
     rig.robot.joints.iter().map(middle).collect()
+}
+
+/// The first camera gives points too, to 5 mm.
+pub fn depth(cameras: usize, seed: u64) -> Rig {
+    let mut rig = random_rig(6, cameras, 12, seed);
+    rig.cameras[0].depth = true;
+    rig
+}
+
+/// Takes the pixels and intrinsics of depth cameras out of a recording.
+pub fn points_alone(truth: &Rig, recording: &mut Recording) {
+    let depth: Vec<bool> = truth.cameras.iter().map(|camera| camera.depth).collect();
+    for (camera, _) in recording.cameras.iter_mut().zip(&depth).filter(|(_, depth)| **depth) {
+        *camera = RecordedCamera { name: camera.name.clone(), ..RecordedCamera::default() };
+    }
+    recording.samples.iter_mut().for_each(|sample| sample.pixels.retain(|seen| !depth[seen.camera as usize]));
 }

@@ -2,6 +2,7 @@
 use super::deviations::Honest;
 use super::direction::{Direction, per_step};
 use super::graph::{Built, State};
+use super::observation::Kind;
 use crate::chain::JointKind;
 use crate::rig::Model;
 use std::f64::consts::PI;
@@ -65,7 +66,7 @@ fn joints_to_move(honest: &Honest<'_>, state: &State, models: &[Model; 2], sd: O
     (0..given.len()).filter(helps).collect()
 }
 
-/// Information of a direction in the pixels of the recorded detections, with one joint displaced in all samples. Where
+/// Information of a direction in the recorded detections, with one joint displaced in all samples. Where
 /// displaced features leave the image, the others stand for them.
 fn seen(honest: &Honest<'_>, state: &State, [ahead, behind]: &[Model; 2], displaced: Option<(usize, f64)>) -> f64 {
     let setup = &honest.setup;
@@ -83,16 +84,15 @@ fn seen(honest: &Honest<'_>, state: &State, [ahead, behind]: &[Model; 2], displa
         }
         let Some([links_ahead, links_behind]) = &links else { continue };
         let point = ahead.in_camera(seen.camera, seen.feature, links_ahead);
-        let a = ahead.pixel(seen.camera, seen.feature, links_ahead);
-        let b = behind.pixel(seen.camera, seen.feature, links_behind);
-        let size = setup.rig.cameras[seen.camera].size;
+        let (a, b) = (seen.predicted(ahead, links_ahead), seen.predicted(behind, links_behind));
+        let size = setup.rig.cameras[seen.camera].size.filter(|_| seen.kind() == Kind::Pixels);
         let is_inside = size.is_none_or(|size| (0..2).all(|k| (0.0..f64::from(size[k])).contains(&a[k])));
         if ahead.cameras[seen.camera].model.is_in_front(&point) && is_inside {
-            squares += (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2);
+            squares += ((a - b) / setup.sd(seen.kind())).norm_squared();
             count += 1;
         }
     }
-    let of_one = squares / f64::from(count.max(1)) * (per_step(1.0) / setup.sigma()).powi(2);
+    let of_one = squares / f64::from(count.max(1)) * per_step(1.0).powi(2);
     of_one * setup.observations.len() as f64
 }
 

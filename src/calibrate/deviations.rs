@@ -2,7 +2,9 @@
 use super::direction::Direction;
 use super::evaluate::median;
 use super::graph::{Built, Freedom, Priors, build, row};
-use super::outliers::{Verdict, distances};
+use super::observation::Kind;
+use super::outliers::Verdict;
+use super::residuals::whitened;
 use super::setup::Setup;
 use super::stage::{Stage, Stages};
 use super::weak::Combination;
@@ -30,9 +32,10 @@ const TIPS: usize = 200;
 
 /// The final problem with the noise that the residuals show, in place of the stated one.
 ///
-/// With weights w = 1/(1 + s/k²) of Cauchy's loss at the squared whitened distance s, an M-estimator's covariance is that of
-/// least squares times E[w² s / 2] / E[w²]² (Huber 1981, eq. 6.6; on two coordinates, ∂ψ/∂r is w² on average). Data alone are
-/// rescaled: priors say what they say. Less noise than stated is not believed.
+/// With weights w = 1/(1 + s/k²) of Cauchy's loss at the squared whitened distance s of m coordinates, an M-estimator's
+/// covariance is that of least squares times E[w² s / m] / E[ψ']² (Huber 1981, eq. 6.6), with ψ' = w² (1 + (1 - 2/m) s/k²) the
+/// mean of ∂ψ/∂r over directions. Data alone are rescaled, pixels and points each by their own: priors say what they say. Less
+/// noise than stated is not believed.
 pub(crate) struct Honest<'a> {
     pub setup: Setup,
     pub priors: &'a Priors,
@@ -42,20 +45,25 @@ pub(crate) struct Honest<'a> {
 impl<'a> Honest<'a> {
     pub fn new(stages: &Stages<'a>, last: &Stage<'_>, state: &State, verdict: &Verdict) -> Self {
         let width = if let Loss::Cauchy(width) = last.loss { width } else { f64::INFINITY };
-        let sigma = stages.setup.sigma();
-        let (mut pulls, mut slopes, mut n) = (0.0, 0.0, 0.0);
-        let distances = distances(stages.setup, state);
-        for distance in distances.iter().zip(&verdict.active).filter(|(_, used)| **used).map(|(distance, _)| distance) {
-            let s = (distance / sigma).powi(2);
-            let w = 1.0 / (1.0 + s / (width * width));
-            (pulls, slopes, n) = (pulls + w * w * s, slopes + w * w, n + 1.0);
-        }
+        let distances = whitened(stages.setup, state);
         // Where something is open, nothing is said of deviations.
-        let redundancy = variances::redundancy_of_pixels(stages, last, state, verdict).unwrap_or(2.0 * n);
-        let left = if redundancy >= 1.0 { 2.0 * n / redundancy } else { 1.0 };
-        let ratio = if n > 0.0 { left * 0.5 * pulls * n / (slopes * slopes) } else { 1.0 };
+        let redundancies = variances::redundancies(stages, last, state, verdict).ok();
+        let shown = |kind: Kind| {
+            let m = kind.coordinates();
+            let (mut pulls, mut slopes, mut n) = (0.0, 0.0, 0.0);
+            for distance in in_use(stages.setup, &distances, verdict, kind) {
+                let s = distance * distance;
+                let ratio = s / (width * width);
+                let w = 1.0 / (1.0 + ratio);
+                (pulls, slopes, n) = (pulls + w * w * s, slopes + w * w * (1.0 + (1.0 - 2.0 / m) * ratio), n + 1.0);
+            }
+            let redundancy = redundancies.map_or(m * n, |redundancies| redundancies[kind as usize]);
+            let left = if redundancy >= 1.0 { m * n / redundancy } else { 1.0 };
+            let ratio = if n > 0.0 { left * pulls / m * n / (slopes * slopes) } else { 1.0 };
+            stages.setup.sd(kind) * ratio.max(1.0).sqrt()
+        };
         let mut setup = stages.setup.clone();
-        setup.rig.noise.pixels = sigma * ratio.max(1.0).sqrt();
+        (setup.rig.noise.pixels, setup.rig.noise.points) = (shown(Kind::Pixels), shown(Kind::Points));
         Honest { setup, priors: stages.priors, loss: Loss::Squared }
     }
 
@@ -66,9 +74,26 @@ impl<'a> Honest<'a> {
 
 /// Root of the mean square of a coordinate's error over the stated noise.
 pub(crate) fn scatter(setup: &Setup, state: &State, verdict: &Verdict) -> f64 {
-    let distances = distances(setup, state);
-    let used: Vec<f64> = distances.iter().zip(&verdict.active).filter(|(_, used)| **used).map(|(d, _)| d * d).collect();
-    (used.iter().sum::<f64>() / (2.0 * used.len().max(1) as f64)).sqrt() / setup.sigma()
+    let distances = whitened(setup, state);
+    let (mut squares, mut coordinates) = (0.0, 0.0);
+    for kind in Kind::ALL {
+        for distance in in_use(setup, &distances, verdict, kind) {
+            squares += distance * distance;
+            coordinates += kind.coordinates();
+        }
+    }
+    (squares / f64::max(coordinates, 2.0)).sqrt()
+}
+
+/// Those of the distances that are of a kind and take part.
+fn in_use<'a>(
+    setup: &'a Setup,
+    distances: &'a [f64],
+    verdict: &'a Verdict,
+    kind: Kind,
+) -> impl Iterator<Item = f64> + 'a {
+    let all = setup.observations.iter().zip(distances).zip(&verdict.active);
+    all.filter(move |((seen, _), active)| **active && seen.kind() == kind).map(|((_, distance), _)| *distance)
 }
 
 /// Deviations at the final state of a stage, by the linearised problem.

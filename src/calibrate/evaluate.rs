@@ -1,14 +1,15 @@
-//! Predicts the pixels of a recording and compares.
+//! Predicts the detections of a recording and compares.
 use crate::Error;
 use crate::recording::{Recording, Sample};
-use crate::rig::{Model, Rig};
+use crate::rig::{Camera, Model, Rig};
+use nalgebra::Vector3;
 
-/// Pixel distances between what a rig predicts and what was seen.
+/// Distances between what a rig predicts and what was seen. Those in px are of pixels, and 0 where there are none.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Errors {
-    /// How many detections were compared.
+    /// How many detections were compared, pixels and points.
     pub observations: usize,
-    /// Root mean square [px]; 0 where there is none.
+    /// Root mean square [px].
     pub rms_px: f64,
     /// Mean [px].
     pub mean_px: f64,
@@ -18,6 +19,23 @@ pub struct Errors {
     pub max_px: f64,
     /// How many are predicted behind the camera.
     pub behind: usize,
+    /// Of points that depth cameras saw.
+    pub points: PointErrors,
+}
+
+/// Distances between predicted and seen points of depth cameras; 0 where there are none.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PointErrors {
+    /// How many points were compared.
+    pub observations: usize,
+    /// Root mean square [m].
+    pub rms_m: f64,
+    /// Mean [m].
+    pub mean_m: f64,
+    /// Median [m].
+    pub median_m: f64,
+    /// Largest [m].
+    pub max_m: f64,
 }
 
 /// Errors of one camera.
@@ -44,12 +62,68 @@ pub struct Evaluation {
     pub cameras: Vec<CameraErrors>,
     /// Median pixel distance of every sample [px], where anything was compared in it.
     pub sample_median_px: Vec<Option<f64>>,
+    /// Median distance of the points of every sample [m], where any were compared in it.
+    pub sample_median_m: Vec<Option<f64>>,
 }
 
-/// Predicts every pixel of a recording from its joints, or from its tip's pose where it has none, and compares.
+/// Distances of single detections from where they are predicted.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Distances {
+    /// Of pixels [px], each with whether it is predicted behind the camera.
+    pub pixels: Vec<(f64, bool)>,
+    /// Of points [m].
+    pub points: Vec<f64>,
+}
+
+/// Predicts every detection of a recording from its joints, or from its tip's pose where it has none, and compares.
 ///
 /// Fails with [`Error::Unusable`] where the rig is not complete or has another number of joints.
 pub fn evaluate(rig: &Rig, recording: &Recording) -> Result<Evaluation, Error> {
+    let mut of_camera = vec![Distances::default(); rig.cameras.len()];
+    let mut evaluation = Evaluation::default();
+    for of_sample in distances(rig, recording)? {
+        let mut all = Distances::default();
+        for (camera, distances) in of_camera.iter_mut().zip(&of_sample.cameras) {
+            camera.extend(distances);
+            all.extend(distances);
+        }
+        evaluation.rejected += of_sample.rejected;
+        evaluation.samples += usize::from(!all.is_empty());
+        let mut pixels: Vec<f64> = all.pixels.iter().map(|(distance, _)| *distance).collect();
+        evaluation.sample_median_px.push((!pixels.is_empty()).then(|| median(&mut pixels)));
+        evaluation.sample_median_m.push((!all.points.is_empty()).then(|| median(&mut all.points)));
+    }
+    let mut total = Distances::default();
+    of_camera.iter().for_each(|distances| total.extend(distances));
+    if total.is_empty() {
+        return Err(Error::NotEnoughData(
+            "nothing to compare: no sample has joints, or a tip pose, and a detection of a feature that the rig knows"
+                .into(),
+        ));
+    }
+    evaluation.total = Errors::new(&total);
+    let errors = |(camera, distances): (&Camera, &Distances)| CameraErrors {
+        name: camera.name.clone(),
+        errors: Errors::new(distances),
+        rejected: 0,
+    };
+    evaluation.cameras = rig.cameras.iter().zip(&of_camera).map(errors).collect();
+    Ok(evaluation)
+}
+
+/// What of one sample could be compared.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SampleDistances {
+    /// Per camera of the rig, in its order.
+    pub cameras: Vec<Distances>,
+    /// How many detections cannot be predicted.
+    pub rejected: usize,
+}
+
+/// Distances of every detection of every sample.
+///
+/// Errors: as of [`evaluate()`], but that nothing at all may be compared.
+pub fn distances(rig: &Rig, recording: &Recording) -> Result<Vec<SampleDistances>, Error> {
     let model = Model::new(rig)?;
     let has_joints = recording.samples.iter().any(|sample| sample.joints.is_some());
     if has_joints && model.chain.len() != recording.joints.len() {
@@ -60,55 +134,37 @@ pub fn evaluate(rig: &Rig, recording: &Recording) -> Result<Evaluation, Error> {
         )));
     }
     let index = Correspondence::new(rig, recording);
-    let mut distances: Vec<Vec<(f64, bool)>> = vec![Vec::new(); rig.cameras.len()];
-    let mut evaluation = Evaluation::default();
-    for sample in &recording.samples {
-        let mut of_sample = Vec::new();
-        for (camera, distance, behind) in sample_errors(&model, &index, sample) {
-            of_sample.push(distance);
-            distances[camera].push((distance, behind));
-        }
-        evaluation.rejected += sample.pixels.len() - of_sample.len();
-        evaluation.samples += usize::from(!of_sample.is_empty());
-        evaluation.sample_median_px.push((!of_sample.is_empty()).then(|| median(&mut of_sample)));
-    }
-    evaluation.total = Errors::new(&distances.concat());
-    evaluation.cameras = rig
-        .cameras
-        .iter()
-        .zip(&distances)
-        .map(|(camera, distances)| CameraErrors {
-            name: camera.name.clone(),
-            errors: Errors::new(distances),
-            rejected: 0,
-        })
-        .collect();
-    if evaluation.total.observations == 0 {
-        return Err(Error::NotEnoughData(
-            "nothing to compare: no sample has joints, or a tip pose, and a detection of a feature that the rig knows"
-                .into(),
-        ));
-    }
-    Ok(evaluation)
+    Ok(recording.samples.iter().map(|sample| of_sample(&model, &index, sample)).collect())
 }
 
-/// (camera, pixel distance, whether predicted behind) of every detection of a sample that can be predicted.
-fn sample_errors<'a>(
-    model: &'a Model,
-    index: &'a Correspondence,
-    sample: &'a Sample,
-) -> impl Iterator<Item = (usize, f64, bool)> + 'a {
+fn of_sample(model: &Model, index: &Correspondence, sample: &Sample) -> SampleDistances {
+    let mut found = SampleDistances { cameras: vec![Distances::default(); model.cameras.len()], rejected: 0 };
     let from_pose = || sample.pose.map(|tip| vec![model.base, tip]);
     let links = sample.joints.as_ref().map(|joints| model.links(joints)).or_else(from_pose);
-    sample.pixels.iter().filter_map(move |detection| {
-        let links = links.as_ref()?;
-        let camera = index.cameras[detection.camera as usize]?;
-        let feature = index.features[detection.feature as usize]?;
-        let [u, v] = model.pixel(camera, feature, links);
-        let point = model.in_camera(camera, feature, links);
-        let behind = !model.cameras[camera].model.is_in_front(&point);
-        Some((camera, (u - detection.pixel[0]).hypot(v - detection.pixel[1]), behind))
-    })
+    let Some(links) = links else {
+        found.rejected = sample.pixels.len() + sample.points.len();
+        return found;
+    };
+    let known = |camera: u32, feature: u32| Some((index.cameras[camera as usize]?, index.features[feature as usize]?));
+    for seen in &sample.pixels {
+        let known = known(seen.camera, seen.feature).filter(|(camera, _)| model.cameras[*camera].has_lens());
+        let Some((camera, feature)) = known else {
+            found.rejected += 1;
+            continue;
+        };
+        let [u, v] = model.pixel(camera, feature, &links);
+        let behind = !model.cameras[camera].model.is_in_front(&model.in_camera(camera, feature, &links));
+        found.cameras[camera].pixels.push(((u - seen.pixel[0]).hypot(v - seen.pixel[1]), behind));
+    }
+    for seen in &sample.points {
+        let Some((camera, feature)) = known(seen.camera, seen.feature) else {
+            found.rejected += 1;
+            continue;
+        };
+        let off = model.in_camera(camera, feature, &links) - Vector3::from(seen.point);
+        found.cameras[camera].points.push(off.norm());
+    }
+    found
 }
 
 /// Which camera and feature of a rig each of a recording's is, by name.
@@ -129,24 +185,44 @@ impl Correspondence {
     }
 }
 
+impl Distances {
+    /// Adds others.
+    pub fn extend(&mut self, others: &Distances) {
+        self.pixels.extend(&others.pixels);
+        self.points.extend(&others.points);
+    }
+
+    /// True where there is neither a pixel nor a point.
+    pub fn is_empty(&self) -> bool {
+        self.pixels.is_empty() && self.points.is_empty()
+    }
+}
+
 impl Errors {
-    /// Of pixel distances, each with whether it was predicted behind the camera.
-    pub fn new(distances: &[(f64, bool)]) -> Self {
-        let n = distances.len();
-        if n == 0 {
-            return Errors::default();
-        }
-        let mut sorted: Vec<f64> = distances.iter().map(|(distance, _)| *distance).collect();
-        let median_px = median(&mut sorted);
+    /// Of single distances.
+    pub fn new(distances: &Distances) -> Self {
+        let mut pixels: Vec<f64> = distances.pixels.iter().map(|(distance, _)| *distance).collect();
+        let [rms_px, mean_px, median_px, max_px] = summary(&mut pixels);
+        let mut points = distances.points.clone();
+        let [rms_m, mean_m, median_m, max_m] = summary(&mut points);
         Errors {
-            observations: n,
-            rms_px: (sorted.iter().map(|d| d * d).sum::<f64>() / n as f64).sqrt(),
-            mean_px: sorted.iter().sum::<f64>() / n as f64,
+            observations: pixels.len() + points.len(),
+            rms_px,
+            mean_px,
             median_px,
-            max_px: sorted[n - 1],
-            behind: distances.iter().filter(|(_, behind)| *behind).count(),
+            max_px,
+            behind: distances.pixels.iter().filter(|(_, behind)| *behind).count(),
+            points: PointErrors { observations: points.len(), rms_m, mean_m, median_m, max_m },
         }
     }
+}
+
+/// Root mean square, mean, median and largest; 0 of nothing.
+fn summary(values: &mut [f64]) -> [f64; 4] {
+    let n = values.len().max(1) as f64;
+    let median = median(values);
+    let rms = (values.iter().map(|d| d * d).sum::<f64>() / n).sqrt();
+    [rms, values.iter().sum::<f64>() / n, median, values.last().copied().unwrap_or(0.0)]
 }
 
 /// Sorts, and returns the middle: the mean of the two middle ones of an even number.

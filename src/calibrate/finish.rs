@@ -1,8 +1,10 @@
 //! The learned rig and its account, from the final state.
 use super::deviations::Deviations;
-use super::evaluate::Errors;
+use super::evaluate::{Distances, Errors};
 use super::graph::{State, row};
-use super::outliers::{Verdict, distances};
+use super::observation::Kind;
+use super::outliers::Verdict;
+use super::residuals::distances;
 use super::setup::Setup;
 use super::weak;
 use super::{Calibration, CameraErrors, Finding, Report, StageReport};
@@ -25,20 +27,28 @@ pub(crate) fn finish(
 ) -> Calibration {
     let distances = distances(setup, state);
     let links: Vec<Vec<Pose>> = state.all_links(setup);
-    let mut of_camera: Vec<Vec<(f64, bool)>> = vec![Vec::new(); setup.rig.cameras.len()];
+    let mut of_camera = vec![Distances::default(); setup.rig.cameras.len()];
     let mut left_out = vec![0; setup.rig.cameras.len()];
     let mut used_samples = vec![false; setup.len()];
     for ((seen, distance), active) in setup.observations.iter().zip(&distances).zip(&verdict.active) {
-        if *active {
-            let point = state.model.in_camera(seen.camera, seen.feature, &links[seen.sample]);
-            let behind = !state.model.cameras[seen.camera].model.is_in_front(&point);
-            of_camera[seen.camera].push((*distance, behind));
-            used_samples[seen.sample] = true;
-        } else {
+        if !*active {
             left_out[seen.camera] += 1;
+            continue;
+        }
+        used_samples[seen.sample] = true;
+        let of_camera = &mut of_camera[seen.camera];
+        match seen.kind() {
+            Kind::Pixels => {
+                let point = state.model.in_camera(seen.camera, seen.feature, &links[seen.sample]);
+                let behind = !state.model.cameras[seen.camera].model.is_in_front(&point);
+                of_camera.pixels.push((*distance, behind));
+            }
+            Kind::Points => of_camera.points.push(*distance),
         }
     }
-    let total = Errors::new(&of_camera.concat());
+    let mut together = Distances::default();
+    of_camera.iter().for_each(|distances| together.extend(distances));
+    let total = Errors::new(&together);
     let cameras = setup
         .rig
         .cameras
@@ -60,13 +70,17 @@ pub(crate) fn finish(
         rejected,
         rms_px: total.rms_px,
         mean_px: total.mean_px,
+        rms_points_m: (total.points.observations > 0).then_some(total.points.rms_m),
         gauge: gauge.clone(),
         joints: ranges(setup, state, &used_samples),
         sd: deviations.by_path,
     });
     let unseen = setup.unseen.iter().map(|camera| Finding::UnseenCamera { camera: camera.clone() });
-    let ratio = total.rms_px / (2.0_f64.sqrt() * setup.sigma());
-    let misfit = (ratio > MISFIT).then_some(Finding::Misfit { ratio, stated_px: setup.sigma() });
+    let misfits = Kind::ALL.into_iter().filter_map(|kind| {
+        let rms = if kind == Kind::Pixels { total.rms_px } else { total.points.rms_m };
+        let ratio = rms / (kind.coordinates().sqrt() * setup.sd(kind));
+        (ratio > MISFIT).then(|| Finding::Misfit { ratio, stated: kind.distance(setup.sd(kind)) })
+    });
     let report = Report {
         samples,
         observations: total.observations,
@@ -74,13 +88,14 @@ pub(crate) fn finish(
         rms_px: total.rms_px,
         mean_px: total.mean_px,
         median_px: total.median_px,
+        points: total.points,
         cameras,
         stages,
         converged,
         gauge,
         noise: None,
         states: setup.states.words(&setup.rig.noise),
-        findings: misfit.into_iter().chain(unseen).chain(verdict.findings).collect(),
+        findings: misfits.chain(unseen).chain(verdict.findings).collect(),
         tip: deviations.tip,
         weak: deviations.weak,
         influence: Vec::new(),
@@ -118,12 +133,15 @@ fn learned(setup: &Setup, state: &State) -> Rig {
     }
     for (camera, learned) in rig.cameras.iter_mut().zip(&model.cameras) {
         let [fx, fy, cx, cy, ..] = learned.intrinsics;
+        camera.pose = Some(learned.pose);
+        if !learned.has_lens() {
+            continue;
+        }
         camera.model = Some(learned.model);
         (camera.fx, camera.fy, camera.cx, camera.cy) = (Some(fx), Some(fy), Some(cx), Some(cy));
         let coefficients = learned.model.distortion().len();
         camera.distortion =
             (learned.model != CameraModel::Pinhole).then(|| learned.intrinsics[4..4 + coefficients].to_vec());
-        camera.pose = Some(learned.pose);
     }
     for (feature, learned) in rig.features.iter_mut().zip(&model.features) {
         feature.xyz = Some(learned.xyz.into());

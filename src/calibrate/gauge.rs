@@ -2,10 +2,11 @@
 //!
 //! Pixels do not change when the world moves with everything in it, when all lengths are scaled, when the tip's frame moves
 //! against the features on it, or when the base turns about or slides along the first axis. Where nothing that is known
-//! decides these, a rule does: values that would be redundant are held.
+//! decides these, a rule does: values that would be redundant are held. Points of depth cameras decide the scale.
 use super::deviations::{coordinate_of, intrinsics_of};
 use super::graph::{Freedom, Priors, State, row};
 use super::kinematics::PARALLEL;
+use super::observation::Kind;
 use super::setup::Setup;
 use crate::chain::{Convention, JointKind, LINK_PARAMETERS};
 use crate::rig::{JointField, Parameter, Parent};
@@ -215,7 +216,8 @@ fn tip_is_known(setup: &Setup) -> bool {
     setup.chain_is_known() && (cameras || features)
 }
 
-/// Something given is a length: of a link, between cameras, between features, or the reading of a sliding joint.
+/// Something given is a length: of a link, between cameras, between features, the reading of a sliding joint, or where a depth
+/// camera saw something.
 pub(crate) fn length_is_known(setup: &Setup) -> bool {
     let rig = &setup.rig;
     let given = |value: Option<f64>| value.is_some_and(|value| value != 0.0);
@@ -226,6 +228,7 @@ pub(crate) fn length_is_known(setup: &Setup) -> bool {
     };
     !setup.states.chain
         || setup.states.poses_beside_joints()
+        || setup.has(Kind::Points)
         || rig.robot.joints.iter().any(|joint| joint.kind == JointKind::Prismatic || given(joint.d) || given(joint.a))
         || of_parent(Parent::World) >= 2
         || of_parent(Parent::Tip) >= 2

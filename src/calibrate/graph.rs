@@ -1,9 +1,11 @@
 //! The graph of a calibration: which nodes are free is a table, the factors are the same for every stage.
+use super::cameras::KnownIntrinsics;
+use super::observation::Place;
 use super::setup::Setup;
 use super::states::Start;
 use super::trunk::Trunk;
 use crate::chain::LINK_PARAMETERS;
-use crate::factors::{Intrinsics, Reprojection};
+use crate::factors::{Intrinsics, PointObservation, Reprojection};
 use crate::rig::Model;
 use handeye_solvers::{DynamicVector, FactorKey, Graph, Key, Loss, Pose, Vector};
 
@@ -112,9 +114,9 @@ pub(crate) struct Built {
 impl Freedom {
     /// Everything free but states that are known exactly.
     pub fn all(setup: &Setup) -> Freedom {
-        let unused = |camera: &crate::rig::ModelCamera| {
+        let unused = |(camera, known): (&crate::rig::ModelCamera, &KnownIntrinsics)| {
             let count = 4 + camera.model.distortion().len();
-            std::array::from_fn(|i| i >= count)
+            std::array::from_fn(|i| known.unused || i >= count)
         };
         let model = &setup.model;
         Freedom {
@@ -122,7 +124,7 @@ impl Freedom {
             base: [false; 6],
             parameters: vec![false; model.parameters.len()],
             cameras: vec![[false; 6]; model.cameras.len()],
-            intrinsics: model.cameras.iter().map(unused).collect(),
+            intrinsics: model.cameras.iter().zip(&setup.intrinsics).map(unused).collect(),
             features: vec![[false; 3]; model.features.len()],
             states: setup.states.exact.clone(),
         }
@@ -172,9 +174,17 @@ pub(crate) fn build(
         let carrier = trunk.carrier(feature.parent, seen.sample, &mut built);
         let mount = trunk.carrier(camera.parent, seen.sample, &mut built);
         let (pose, intrinsics) = built.cameras[seen.camera];
-        let factor = Reprojection { pixel: seen.pixel, model: camera.model };
-        let on = (carrier, built.features[seen.feature], mount, pose, intrinsics);
-        let key = built.graph.factor(factor, on).sigma(setup.sigma()).loss(loss).key;
+        let (feature, sd) = (built.features[seen.feature], setup.sd(seen.kind()));
+        let key = match seen.place {
+            Place::Pixel(pixel) => {
+                let factor = Reprojection { pixel, model: camera.model };
+                built.graph.factor(factor, (carrier, feature, mount, pose, intrinsics)).sigma(sd).loss(loss).key
+            }
+            Place::Point(point) => {
+                let on = (carrier, feature, mount, pose);
+                built.graph.factor(PointObservation { point }, on).sigma(sd).loss(loss).key
+            }
+        };
         built.factors.push((index, key));
     }
     if freedom.source != Tips::Seen {

@@ -1,7 +1,9 @@
 //! How much the result hangs on every sample.
 use super::gauge;
 use super::graph::{State, build};
-use super::outliers::{Verdict, distances};
+use super::observation::Kind;
+use super::outliers::Verdict;
+use super::residuals::distances;
 use super::stage::{Stage, Stages};
 use handeye_solvers::{GaussNewton, Solver};
 use nalgebra::Vector3;
@@ -16,8 +18,12 @@ pub struct Influence {
     /// unit where nothing metric is known]; infinite where the others do not determine the rig without it. `None` where the
     /// tip does not follow from anything that is learned.
     pub tip: Option<f64>,
-    /// Root mean square pixel distance of its detections [px].
+    /// Root mean square pixel distance of its detections [px]; 0 without pixels.
     pub rms_px: f64,
+    /// Root mean square distance of its points [m]; 0 without points.
+    pub rms_points_m: f64,
+    /// Root mean square of all its errors, by coordinate [standard deviations].
+    pub misfit: f64,
 }
 
 /// Samples whose tips are compared, spread evenly over the recording.
@@ -41,13 +47,23 @@ pub(crate) fn influence(stages: &Stages<'_>, last: &Stage<'_>, state: &State, ve
     let of_sample = |sample: usize| -> Option<Influence> {
         let first = setup.observations.partition_point(|seen| seen.sample < sample);
         let end = setup.observations.partition_point(|seen| seen.sample <= sample);
-        let squares: Vec<f64> = (first..end).filter(|&i| verdict.active[i]).map(|i| distances[i].powi(2)).collect();
-        if squares.is_empty() {
-            return None;
-        }
-        let rms_px = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        let used = || (first..end).filter(|&i| verdict.active[i]).map(|i| (setup.observations[i].kind(), distances[i]));
+        used().next()?;
+        let rms = |kind: Kind| {
+            let of_kind = || used().filter(|(other, _)| *other == kind);
+            (of_kind().map(|(_, d)| d * d).sum::<f64>() / of_kind().count().max(1) as f64).sqrt()
+        };
+        let whitened: f64 = used().map(|(kind, d)| (d / setup.sd(kind)).powi(2)).sum();
+        let coordinates: f64 = used().map(|(kind, _)| kind.coordinates()).sum();
+        let fits = Influence {
+            sample: setup.samples[sample],
+            tip: None,
+            rms_px: rms(Kind::Pixels),
+            rms_points_m: rms(Kind::Points),
+            misfit: (whitened / coordinates).sqrt(),
+        };
         if !is_learned {
-            return Some(Influence { sample: setup.samples[sample], tip: None, rms_px });
+            return Some(fits);
         }
         let takes_part = |index: usize| verdict.active[index] && !(first..end).contains(&index);
         let mut built = build(setup, state, &freedom, priors, loss, takes_part);
@@ -62,7 +78,7 @@ pub(crate) fn influence(stages: &Stages<'_>, last: &Stage<'_>, state: &State, ve
         let square: f64 = tips(&without).iter().zip(&before).map(|(a, b)| (a - b).norm_squared()).sum();
         let moved = (square / before.len().max(1) as f64).sqrt();
         let tip = if stepped && moved.is_finite() { moved } else { f64::INFINITY };
-        Some(Influence { sample: setup.samples[sample], tip: Some(tip), rms_px })
+        Some(Influence { tip: Some(tip), ..fits })
     };
     (0..setup.len()).into_par_iter().filter_map(of_sample).collect()
 }
@@ -76,7 +92,7 @@ pub fn most_influential(all: &[Influence], count: usize) -> Vec<Influence> {
 
 /// The worst-fitting, the largest error first.
 pub fn worst_fitting(all: &[Influence], count: usize) -> Vec<Influence> {
-    largest(all, count, |one| one.rms_px)
+    largest(all, count, |one| one.misfit)
 }
 
 fn largest(all: &[Influence], count: usize, by: impl Fn(&Influence) -> f64) -> Vec<Influence> {

@@ -6,7 +6,7 @@ use super::kinematics::{find_axes, find_lines, rows};
 use super::known::known_parts;
 use super::look::look;
 use super::motion::from_motion;
-use super::outliers::distances;
+use super::residuals::whitened;
 use super::settle::settle;
 use super::setup::Setup;
 use super::stage::{Stage, Stages};
@@ -108,7 +108,7 @@ fn complete(
     let (loss, takes_part) = (Loss::Cauchy(WIDTH), |_: usize| true);
     let stage = Stage { name: "end to end, robust", freedom: &freedom, loss, takes_part: &takes_part };
     stages.minimize(&stage, &mut state)?;
-    let error = median(&mut distances(setup, &state)) / setup.sigma();
+    let error = median(&mut whitened(setup, &state));
     Ok(First { error, misfit, state })
 }
 

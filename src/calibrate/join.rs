@@ -1,15 +1,21 @@
 //! Brings in what the first look could not place, and says what is missing where that is not possible.
+use super::evaluate::median;
 use super::graph::State;
-use super::setup::{Observation, Setup};
+use super::observation::Observation;
+use super::setup::Setup;
 use crate::Error;
-use crate::geometry::{resect_robust, triangulate};
+use crate::geometry::{align_robust, resect_robust, triangulate};
+use handeye_solvers::Pose;
 use nalgebra::Vector3;
 
 /// Largest error of a good bearing while joining [px].
 const THRESHOLD_PX: f64 = 6.0;
 
-/// Places every camera among the known features by resection and every feature by triangulation, in turns, until nothing
-/// is left or nothing more can be placed.
+/// Points that place a depth camera: three determine its pose, the fourth says whether it is right.
+const POINTS: usize = 4;
+
+/// Places every camera among the known features by alignment or resection and every feature by its points or triangulation, in
+/// turns, until nothing is left or nothing more can be placed.
 pub(crate) fn join(
     setup: &Setup,
     state: &mut State,
@@ -35,26 +41,22 @@ pub(crate) fn join(
     missing_after(setup, &cameras, &features)
 }
 
-fn place_feature(
-    setup: &Setup,
-    state: &mut State,
-    links: &[Vec<handeye_solvers::Pose>],
-    cameras: &[bool],
-    feature: usize,
-) -> bool {
-    let (mut poses, mut bearings) = (Vec::new(), Vec::new());
+fn place_feature(setup: &Setup, state: &mut State, links: &[Vec<Pose>], cameras: &[bool], feature: usize) -> bool {
+    let (mut poses, mut bearings, mut places) = (Vec::new(), Vec::new(), Vec::new());
     let model = &state.model;
     let of_feature = |seen: &&Observation| seen.feature == feature && cameras[seen.camera] && state.placed[seen.sample];
     for seen in setup.observations.iter().filter(of_feature) {
         let camera = &model.cameras[seen.camera];
-        if let Some(bearing) = camera.model.unproject(&camera.intrinsics, seen.pixel) {
+        if let Some(bearing) = seen.bearing(model) {
             let carrier = model.carrier(model.features[feature].parent, &links[seen.sample]);
             let mount = model.carrier(camera.parent, &links[seen.sample]);
-            poses.push((mount * camera.pose).inverse() * carrier);
+            let camera_from_carrier = (mount * camera.pose).inverse() * carrier;
+            places.extend(seen.point().map(|point| camera_from_carrier.inverse_transform(&point)));
+            poses.push(camera_from_carrier);
             bearings.push(bearing);
         }
     }
-    match triangulate(&poses, &bearings) {
+    match middle(&places).or_else(|| triangulate(&poses, &bearings)) {
         Some(xyz) => {
             state.model.features[feature].xyz = xyz;
             true
@@ -63,10 +65,16 @@ fn place_feature(
     }
 }
 
+/// The median of each coordinate; `None` of nothing.
+fn middle(places: &[Vector3<f64>]) -> Option<Vector3<f64>> {
+    let coordinate = |k: usize| median(&mut places.iter().map(|place| place[k]).collect::<Vec<_>>());
+    (!places.is_empty()).then(|| Vector3::from_fn(|k, _| coordinate(k)))
+}
+
 fn place_camera(
     setup: &Setup,
     state: &mut State,
-    links: &[Vec<handeye_solvers::Pose>],
+    links: &[Vec<Pose>],
     features: &[bool],
     camera: usize,
     seed: u64,
@@ -74,14 +82,25 @@ fn place_camera(
     let model = &state.model;
     let lens = model.cameras[camera];
     let (mut points, mut bearings): (Vec<Vector3<f64>>, Vec<Vector3<f64>>) = (Vec::new(), Vec::new());
+    let (mut in_mount, mut in_camera) = (Vec::new(), Vec::new());
     let of_camera = |seen: &&Observation| seen.camera == camera && features[seen.feature] && state.placed[seen.sample];
     for seen in setup.observations.iter().filter(of_camera) {
-        if let Some(bearing) = lens.model.unproject(&lens.intrinsics, seen.pixel) {
-            let feature = &model.features[seen.feature];
-            let in_world = model.carrier(feature.parent, &links[seen.sample]).transform(&feature.xyz);
-            points.push(model.carrier(lens.parent, &links[seen.sample]).inverse_transform(&in_world));
+        let feature = &model.features[seen.feature];
+        let in_world = model.carrier(feature.parent, &links[seen.sample]).transform(&feature.xyz);
+        let point = model.carrier(lens.parent, &links[seen.sample]).inverse_transform(&in_world);
+        if let Some(measured) = seen.point() {
+            in_mount.push(point);
+            in_camera.push(measured);
+        } else if let Some(bearing) = seen.bearing(model) {
+            points.push(point);
             bearings.push(bearing);
         }
+    }
+    if in_camera.len() >= POINTS
+        && let Some(pose) = align_robust(&in_camera, &in_mount, seed)
+    {
+        state.model.cameras[camera].pose = pose;
+        return true;
     }
     let threshold = THRESHOLD_PX / lens.intrinsics[0] + 2.0 * setup.state_angle();
     match resect_robust(&points, &bearings, threshold, seed) {

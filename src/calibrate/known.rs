@@ -1,8 +1,9 @@
 //! A first state from what is known of the rig already: known cameras and features place the rest, however few the samples.
 use super::evaluate::median;
 use super::graph::State;
-use super::setup::{Observation, Setup};
-use crate::geometry::resect;
+use super::observation::Observation;
+use super::setup::Setup;
+use crate::geometry::{align, resect};
 use crate::rig::{Parameter, Parent};
 use handeye_solvers::Pose;
 use std::collections::BTreeMap;
@@ -43,10 +44,8 @@ fn place_base(setup: &Setup, state: &mut State, cameras: &[bool], features: &[bo
         let mut moved = state.clone();
         moved.model.base = *base;
         let links = moved.all_links(setup);
-        let distance = |seen: &&Observation| {
-            let [u, v] = moved.model.pixel(seen.camera, seen.feature, &links[seen.sample]);
-            (u - seen.pixel[0]).hypot(v - seen.pixel[1])
-        };
+        let distance =
+            |seen: &&Observation| seen.error(&moved.model, &links[seen.sample]).norm() / setup.sd(seen.kind());
         median(&mut all.iter().map(distance).collect::<Vec<_>>())
     };
     let best = candidates.map(|base| (usual_error(&base), base)).min_by(|a, b| a.0.total_cmp(&b.0));
@@ -64,12 +63,11 @@ fn is_across(setup: &Setup, seen: &Observation) -> bool {
 /// Where the tip may be, by one image.
 fn world_from_tip(setup: &Setup, camera: usize, seen: &[&Observation]) -> Vec<Pose> {
     let camera = &setup.model.cameras[camera];
-    let ray = |seen: &&Observation| {
-        let bearing = camera.model.unproject(&camera.intrinsics, seen.pixel)?;
-        Some((setup.model.features[seen.feature].xyz, bearing))
-    };
+    let ray = |seen: &&Observation| Some((setup.model.features[seen.feature].xyz, seen.bearing(&setup.model)?));
     let (points, bearings): (Vec<_>, Vec<_>) = seen.iter().filter_map(ray).unzip();
-    let found = resect(&points, &bearings).into_iter();
+    let point = |seen: &&Observation| Some((setup.model.features[seen.feature].xyz, seen.point()?));
+    let (from, to): (Vec<_>, Vec<_>) = seen.iter().filter_map(point).unzip();
+    let found = align(&from, &to).into_iter().chain(resect(&points, &bearings));
     match camera.parent {
         // camera_from_tip
         Parent::World => found.map(|pose| camera.pose * pose).collect(),

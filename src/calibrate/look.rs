@@ -1,6 +1,9 @@
 //! Cameras, structure and tips from the images alone (eqs. 2 and 3).
+use super::evaluate::median;
+use super::gauge;
 use super::graph::{Freedom, State};
 use super::join;
+use super::observation::{Kind, Observation};
 use super::setup::Setup;
 use super::stage::{Stage, Stages};
 use super::visual::{Scene, Sighting, Views, reconstruct};
@@ -69,16 +72,21 @@ fn scenes(setup: &Setup, on_arm: bool, seed: u64) -> Vec<Scene> {
     let mut samples: Vec<Vec<Sighting>> = vec![Vec::new(); setup.len()];
     let every = setup.len().div_ceil(LOOK);
     for seen in setup.observations.iter().filter(|seen| seen.sample % every == 0) {
-        let camera = &model.cameras[seen.camera];
-        if (camera.parent, model.features[seen.feature].parent) != frames(on_arm) {
+        let &Observation { sample, camera, feature, .. } = seen;
+        if (model.cameras[camera].parent, model.features[feature].parent) != frames(on_arm) {
             continue;
         }
-        if let Some(bearing) = camera.model.unproject(&camera.intrinsics, seen.pixel) {
-            samples[seen.sample].push(Sighting { camera: seen.camera, feature: seen.feature, bearing });
+        let sightings = &mut samples[sample];
+        // What a camera has both pixel and point of is one sighting.
+        let same = sightings.iter_mut().find(|other| (other.camera, other.feature) == (camera, feature));
+        if let Some(sighting) = same {
+            sighting.point = seen.point();
+        } else if let Some(bearing) = seen.bearing(model) {
+            sightings.push(Sighting { camera, feature, bearing, point: seen.point() });
         }
     }
-    let focal = model.cameras.iter().map(|camera| camera.intrinsics[0]).fold(f64::INFINITY, f64::min);
-    let threshold = (THRESHOLD * setup.sigma()).max(THRESHOLD_PX) / focal;
+    let focals = model.cameras.iter().filter(|camera| camera.has_lens()).map(|camera| camera.intrinsics[0]);
+    let threshold = (THRESHOLD * setup.sd(Kind::Pixels)).max(THRESHOLD_PX) / focals.fold(f64::INFINITY, f64::min);
     let (cameras, features) = (model.cameras.len(), model.features.len());
     reconstruct(&Views { samples: &samples, cameras, features, threshold, seed })
 }
@@ -86,7 +94,6 @@ fn scenes(setup: &Setup, on_arm: bool, seed: u64) -> Vec<Scene> {
 /// Bundle adjustment of what is seen, with the first camera and the first tip held.
 fn refine(seen: &mut Seen, on_arm: bool, width: f64, stages: &mut Stages<'_>) -> Result<(), Error> {
     let setup = stages.setup;
-    let model = &setup.model;
     let mut freedom = Freedom::seen(setup);
     // Images alone tell little of intrinsics: those that are given are trusted until the chain is there.
     for (held, known) in freedom.intrinsics.iter_mut().zip(&setup.intrinsics) {
@@ -94,15 +101,13 @@ fn refine(seen: &mut Seen, on_arm: bool, width: f64, stages: &mut Stages<'_>) ->
     }
     freedom.cameras[seen.cameras.iter().position(|placed| *placed).unwrap_or(0)] = [true; 6];
     freedom.states[seen.placed.iter().position(|placed| *placed).unwrap_or(0)] = true;
-    let takes_part = |index: usize| {
-        let o = &setup.observations[index];
-        let parents = (model.cameras[o.camera].parent, model.features[o.feature].parent);
-        parents == frames(on_arm) && seen.placed[o.sample] && seen.cameras[o.camera] && seen.features[o.feature]
-    };
+    let takes_part = |index: usize| takes_part(setup, seen, on_arm, &setup.observations[index]);
     let missing = (0..setup.observations.len()).filter(|&index| !takes_part(index)).count();
     let loss = Loss::Cauchy(width);
     let stage = Stage { name: "cameras and structure", freedom: &freedom, loss, takes_part: &takes_part };
-    seen.cost = MISSING * missing as f64 + stages.minimize(&stage, &mut seen.state)?.final_cost;
+    let mut state = seen.state.clone();
+    let cost = MISSING * missing as f64 + stages.minimize(&stage, &mut state)?.final_cost;
+    (seen.state, seen.cost) = (state, cost);
     Ok(())
 }
 
@@ -132,11 +137,36 @@ fn seen_from(setup: &Setup, scene: &Scene, on_arm: bool) -> Option<Seen> {
         }
     }
     let placed: Vec<bool> = scene.objects.iter().map(Option::is_some).collect();
-    (placed.iter().filter(|placed| **placed).count() >= 3).then(|| Seen {
+    let is_seen = placed.iter().filter(|placed| **placed).count() >= 3;
+    let mut seen = is_seen.then(|| Seen {
         state,
         placed,
         cameras: scene.cameras.iter().map(Option::is_some).collect(),
         features: scene.features.iter().map(Option::is_some).collect(),
         cost: f64::INFINITY,
-    })
+    })?;
+    if let Some(scale) = measured_scale(setup, &seen, on_arm) {
+        gauge::rescale(&mut seen.state, scale);
+    }
+    Some(seen)
+}
+
+/// What lengths must be multiplied by to be what depth cameras measured, in the median.
+fn measured_scale(setup: &Setup, seen: &Seen, on_arm: bool) -> Option<f64> {
+    let model = &seen.state.model;
+    let mut ratios: Vec<f64> = Vec::new();
+    for one in setup.observations.iter().filter(|one| takes_part(setup, seen, on_arm, one)) {
+        let Some(point) = one.point() else { continue };
+        let predicted = one.predicted(model, &[model.base, seen.state.tips[one.sample]]).norm();
+        ratios.extend((predicted > 0.0).then(|| point.norm() / predicted));
+    }
+    let scale = median(&mut ratios);
+    (scale > 0.0).then_some(scale)
+}
+
+/// True where everything that an observation hangs on is placed.
+fn takes_part(setup: &Setup, seen: &Seen, on_arm: bool, one: &Observation) -> bool {
+    let model = &setup.model;
+    let parents = (model.cameras[one.camera].parent, model.features[one.feature].parent);
+    parents == frames(on_arm) && seen.placed[one.sample] && seen.cameras[one.camera] && seen.features[one.feature]
 }

@@ -1,5 +1,6 @@
 //! Learns a rig from a recording.
 mod anchor;
+mod cameras;
 mod cures;
 mod deviations;
 mod direction;
@@ -12,15 +13,18 @@ mod initialise;
 mod join;
 mod kinematics;
 mod known;
+mod leverage;
 mod look;
 mod motion;
 mod numbers;
+mod observation;
 mod outliers;
 mod poorly;
 mod priors;
 mod readings;
 mod relearn;
 mod report;
+mod residuals;
 mod robust;
 mod selection;
 mod settle;
@@ -35,18 +39,18 @@ mod variances;
 mod visual;
 mod weak;
 
-pub use evaluate::{CameraErrors, Errors, Evaluation, evaluate};
+pub use evaluate::{CameraErrors, Distances, Errors, Evaluation, PointErrors, SampleDistances, distances, evaluate};
 pub(crate) use evaluate::{Correspondence, median};
 pub use influence::{Influence, most_influential, worst_fitting};
 pub use relearn::relearn;
-pub use report::{Calibration, Finding, Report, StageReport, TipDeviation};
+pub use report::{Calibration, Distance, Finding, Report, StageReport, TipDeviation};
 pub use selection::{NoiseTrial, select_noise};
 pub use suggest::{SuggestOptions, SuggestedSample, Suggestion, suggest};
 pub use targets::{Disagreement, TargetReport};
 pub use weak::{Combination, DeterminedBy};
 
 use crate::Error;
-use crate::recording::Recording;
+use crate::recording::{Recording, Sample};
 use crate::rig::{Noise, Parameter, Rig};
 use deviations::{Honest, deviations, scatter};
 use finish::finish;
@@ -62,7 +66,7 @@ use std::ops::ControlFlow;
 pub struct Options {
     /// Seed of every random choice: the same seed gives the same rig, bit for bit.
     pub seed: u64,
-    /// Whether the noise of pixels, joints, poses and actions is estimated from the data (variance components). What the
+    /// Whether the noise of pixels, points, joints, poses and actions is estimated from the data (variance components). What the
     /// rig states is where that starts; where it says that something recorded is exact, a guess is.
     pub estimate_noise: bool,
     /// Whether the influence of every sample is computed: takes one linearisation per sample.
@@ -214,13 +218,15 @@ fn fit(stages: &mut Stages<'_>, start: Option<State>, seed: u64) -> Result<Fitte
 
 /// True where targets are what there is to learn from. Where joints and pixels were recorded too, pixels say more.
 fn is_of_targets(recording: &Recording) -> bool {
-    let seen = |sample: &crate::recording::Sample| !sample.pixels.is_empty() && sample.joints.is_some();
+    let has_detections = |sample: &Sample| !sample.pixels.is_empty() || !sample.points.is_empty();
+    let seen = |sample: &Sample| has_detections(sample) && sample.joints.is_some();
     recording.samples.iter().any(|sample| !sample.targets.is_empty()) && !recording.samples.iter().any(seen)
 }
 
 /// A camera that projects backwards or not at all was not learned.
 fn check_cameras(setup: &Setup, state: &State) -> Result<(), Error> {
-    for (camera, learned) in setup.rig.cameras.iter().zip(&state.model.cameras) {
+    let lenses = setup.rig.cameras.iter().zip(&state.model.cameras).filter(|(_, learned)| learned.has_lens());
+    for (camera, learned) in lenses {
         let [fx, fy, ..] = learned.intrinsics;
         if !(fx > 0.0 && fy > 0.0 && learned.intrinsics.iter().all(|value| value.is_finite())) {
             return Err(Error::NotEnoughData(format!(

@@ -3,7 +3,8 @@
 //! Where images show too little to be explained by themselves (few features, seldom shared), the known motion of what carries
 //! them still does: a feature is taken to be somewhere near the tip, which gives the camera, and both are refined.
 use super::graph::{Freedom, State};
-use super::setup::{Observation, Setup};
+use super::observation::Observation;
+use super::setup::Setup;
 use super::stage::{Stage, Stages};
 use crate::Error;
 use crate::geometry::resect;
@@ -115,7 +116,7 @@ fn candidates(setup: &Setup, state: &State, links: &[Vec<Pose>], seen: &[&Observ
     let lens = &model.cameras[camera];
     let (mut points, mut bearings) = (Vec::new(), Vec::new());
     for seen in seen.iter().step_by(seen.len().div_ceil(POINTS)) {
-        if let Some(bearing) = lens.model.unproject(&lens.intrinsics, seen.pixel) {
+        if let Some(bearing) = seen.bearing(model) {
             let feature = &model.features[seen.feature];
             let in_world = model.carrier(feature.parent, &links[seen.sample]).transform(&feature.xyz);
             points.push(model.carrier(lens.parent, &links[seen.sample]).inverse_transform(&in_world));

@@ -1,8 +1,7 @@
 //! Readings of noisy states that do not fit what the images show.
 use super::Finding;
-use super::evaluate::median;
 use super::graph::State;
-use super::outliers::distances_of;
+use super::residuals::usual_distance;
 use super::setup::Setup;
 use handeye_solvers::manifold::so3;
 
@@ -45,9 +44,9 @@ pub(super) fn findings(setup: &Setup, state: &State) -> Vec<Finding> {
             if let Some(pose) = setup.states.poses[sample].filter(|_| !setup.states.chain) {
                 read.tips[sample] = pose;
             }
-            let median_px = median(&mut distances_of(setup, &read, sample));
+            let off = usual_distance(setup, &read, sample, |_| true);
             let by_pose = !setup.states.chain;
-            Finding::WrongJoints { sample: setup.samples[sample], median_px, swapped_with: None, by_pose }
+            Finding::WrongJoints { sample: setup.samples[sample], off, swapped_with: None, by_pose }
         })
         .collect()
 }

@@ -164,7 +164,9 @@ fn check_rest(rig: &Rig, part: &Rig, free: &[String]) -> Result<(), Error> {
 fn check_seen(rig: &Rig, part: &Rig, free: &[String], recording: &Recording) -> Result<(), Error> {
     let seen = |name: &str| {
         let is_of = |camera: u32| recording.cameras[camera as usize].name == name;
-        recording.samples.iter().any(|sample| sample.pixels.iter().any(|detection| is_of(detection.camera)))
+        recording.samples.iter().any(|sample| {
+            sample.pixels.iter().any(|seen| is_of(seen.camera)) || sample.points.iter().any(|seen| is_of(seen.camera))
+        })
     };
     let is_asked_for = |(index, camera): &(usize, &Camera)| {
         camera.pose.is_none() && (*index < rig.cameras.len() || is_free(free, &format!("cameras.{}.pose", camera.name)))

@@ -1,5 +1,5 @@
 //! What a calibration did and found, and how good it is.
-use super::{CameraErrors, Combination, Influence, TargetReport};
+use super::{CameraErrors, Combination, Influence, PointErrors, TargetReport};
 use crate::rig::{Noise, Rig};
 
 /// A learned rig and how it came about.
@@ -26,6 +26,8 @@ pub struct Report {
     pub mean_px: f64,
     /// Median pixel distance [px].
     pub median_px: f64,
+    /// Of those detections that are points of depth cameras.
+    pub points: PointErrors,
     /// The same per camera.
     pub cameras: Vec<CameraErrors>,
     /// What was minimised, in order.
@@ -77,8 +79,8 @@ pub enum Finding {
     Misfit {
         /// Root mean square error of a coordinate over its stated standard deviation.
         ratio: f64,
-        /// Stated standard deviation of a coordinate [px].
-        stated_px: f64,
+        /// Stated standard deviation of a coordinate.
+        stated: Distance,
     },
     /// Single detections were left out.
     Outliers {
@@ -92,8 +94,8 @@ pub enum Finding {
     WrongJoints {
         /// Index of the sample, from 0.
         sample: usize,
-        /// Its median pixel distance under the learned rig [px].
-        median_px: f64,
+        /// Its median distance from where the learned rig predicts it.
+        off: Distance,
         /// The sample whose images its joints fit, where the two were swapped.
         swapped_with: Option<usize>,
         /// True where tip poses were read and no joints.
@@ -110,15 +112,15 @@ pub enum Finding {
         sample: usize,
         /// The camera's name.
         camera: String,
-        /// Its median pixel distance under the learned rig [px].
-        median_px: f64,
+        /// Its median distance from where the learned rig predicts it; of its points, where those are what is wrong.
+        off: Distance,
     },
     /// A camera was not where it was during the whole recording; its images were left out of the fit of all else.
     CameraMoved {
         /// The camera's name.
         camera: String,
-        /// Largest median shift of an image from where the learned rig puts it [px].
-        largest_px: f64,
+        /// Largest median shift of an image from where the learned rig puts it.
+        largest: Distance,
         /// The sample of that image, from 0.
         sample: usize,
     },
@@ -128,15 +130,15 @@ impl std::fmt::Display for Finding {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Finding::UnseenCamera { camera } => write!(f, "camera `{camera}` saw nothing and was left out"),
-            Finding::Misfit { ratio, stated_px } => write!(
+            Finding::Misfit { ratio, stated } => write!(
                 f,
-                "errors are {ratio:.1} times the stated noise of {stated_px} px: the noise is larger, a lens model or a joint's kind \
+                "errors are {ratio:.1} times the stated noise of {stated:.2}: the noise is larger, a lens model or a joint's kind \
                  is wrong, or the fit went astray"
             ),
             Finding::Outliers { count, of } => write!(f, "{count} of {of} detections do not fit and were left out"),
-            Finding::WrongJoints { sample, median_px, swapped_with, by_pose } => {
+            Finding::WrongJoints { sample, off, swapped_with, by_pose } => {
                 let (leads, fits) = if *by_pose { ("tip pose does", "it fits") } else { ("joints do", "they fit") };
-                write!(f, "sample {sample}: its {leads} not lead to what the cameras saw ({median_px:.1} px)")?;
+                write!(f, "sample {sample}: its {leads} not lead to what the cameras saw ({off:.1})")?;
                 match swapped_with {
                     Some(other) => write!(f, "; {fits} the images of sample {other}: the two are swapped"),
                     None => Ok(()),
@@ -148,13 +150,34 @@ impl std::fmt::Display for Finding {
                     "sample {sample}: nothing was read of the robot's state, and its images do not determine it; it was left out"
                 )
             }
-            Finding::WrongImage { sample, camera, median_px } => {
-                write!(f, "sample {sample}: the image of camera `{camera}` belongs to another pose ({median_px:.1} px)")
+            Finding::WrongImage { sample, camera, off } => {
+                write!(f, "sample {sample}: the image of camera `{camera}` belongs to another pose ({off:.1})")
             }
-            Finding::CameraMoved { camera, largest_px, sample } => {
-                write!(f, "camera `{camera}` moved during the recording: sample {sample} is {largest_px:.1} px off")
+            Finding::CameraMoved { camera, largest, sample } => {
+                write!(f, "camera `{camera}` moved during the recording: sample {sample} is {largest:.1} off")
             }
         }
+    }
+}
+
+/// A distance in an image, or in space where it is one of points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Distance {
+    /// Of pixels [px].
+    Pixels(f64),
+    /// Of points [m].
+    Metres(f64),
+}
+
+/// With its unit; points in mm. A precision is that of the number.
+impl std::fmt::Display for Distance {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (value, unit) = match self {
+            Distance::Pixels(px) => (*px, "px"),
+            Distance::Metres(m) => (1e3 * m, "mm"),
+        };
+        value.fmt(f)?;
+        write!(f, " {unit}")
     }
 }
 

@@ -18,6 +18,10 @@ pub struct NoiseTrial {
     pub noise: Noise,
     /// Mean pixel distance of the held-out samples, predicted from their readings [px]; infinite where no rig was learned.
     pub mean_px: f64,
+    /// The same of points [m].
+    pub mean_points_m: f64,
+    /// Mean distance of all detections in standard deviations of a coordinate: what the trials are compared by.
+    pub misfit: f64,
 }
 
 /// Tries several ratios of the noise of states to that of pixels, and returns how each predicts samples held out of the fit:
@@ -48,18 +52,18 @@ pub fn select_noise(
             return Err(Error::Cancelled);
         }
         let noise = scaled(&stated, factor);
-        let mean_px = match held_out(&Rig { noise, ..rig.clone() }, recording, &options) {
-            Ok(mean_px) => mean_px,
+        let [mean_px, mean_points_m, misfit] = match held_out(&Rig { noise, ..rig.clone() }, recording, &options) {
+            Ok(means) => means,
             Err(Error::NotEnoughData(reason)) => {
                 failure = Some(Error::NotEnoughData(reason));
-                f64::INFINITY
+                [f64::INFINITY; 3]
             }
             Err(error) => return Err(error),
         };
-        trials.push(NoiseTrial { factor, noise, mean_px });
+        trials.push(NoiseTrial { factor, noise, mean_px, mean_points_m, misfit });
     }
     match failure {
-        Some(error) if trials.iter().all(|trial| trial.mean_px.is_infinite()) => Err(error),
+        Some(error) if trials.iter().all(|trial| trial.misfit.is_infinite()) => Err(error),
         _ => Ok(trials),
     }
 }
@@ -68,8 +72,8 @@ impl NoiseTrial {
     /// The one to take: of all that predict within 1 % of the best, which noise in the readings of held-out samples cannot tell
     /// apart, the one nearest to what was stated.
     pub fn best(trials: &[NoiseTrial]) -> Option<&NoiseTrial> {
-        let least = trials.iter().map(|trial| trial.mean_px).fold(f64::INFINITY, f64::min);
-        let good = trials.iter().filter(|trial| trial.mean_px <= 1.01 * least);
+        let least = trials.iter().map(|trial| trial.misfit).fold(f64::INFINITY, f64::min);
+        let good = trials.iter().filter(|trial| trial.misfit <= 1.01 * least);
         good.min_by(|a, b| a.factor.ln().abs().total_cmp(&b.factor.ln().abs()))
     }
 }
@@ -83,15 +87,20 @@ fn scaled(noise: &Noise, factor: f64) -> Noise {
     scaled
 }
 
-/// Mean pixel distance of all samples, each predicted by a rig learned without it [px].
-fn held_out(rig: &Rig, recording: &Recording, options: &Options) -> Result<f64, Error> {
-    let (mut sum, mut count) = (0.0, 0);
+/// Mean distance of all pixels [px], points [m], and both [standard deviations], each predicted by a rig learned without its sample.
+fn held_out(rig: &Rig, recording: &Recording, options: &Options) -> Result<[f64; 3], Error> {
+    let (mut sums, mut counts) = ([0.0; 2], [0; 2]);
     for fold in 0..FOLDS {
         let rest = recording.select(|sample| sample % FOLDS != fold);
         let learned = calibrate(rig, &rest, options, &mut |_| ControlFlow::Continue(()))?;
         let judged = evaluate(&learned.rig, &recording.select(|sample| sample % FOLDS == fold))?.total;
-        sum += judged.mean_px * judged.observations as f64;
-        count += judged.observations;
+        let of_fold = [judged.observations - judged.points.observations, judged.points.observations];
+        for (kind, mean) in [judged.mean_px, judged.points.mean_m].into_iter().enumerate() {
+            sums[kind] += mean * of_fold[kind] as f64;
+            counts[kind] += of_fold[kind];
+        }
     }
-    Ok(sum / count.max(1) as f64)
+    let mean = |kind: usize| sums[kind] / counts[kind].max(1) as f64;
+    let whitened = sums[0] / rig.noise.pixels.max(1e-3) + sums[1] / rig.noise.points.max(1e-6);
+    Ok([mean(0), mean(1), whitened / (counts[0] + counts[1]).max(1) as f64])
 }

@@ -6,6 +6,7 @@ use super::anchor::Anchor;
 use super::evaluate::median;
 use super::gauge::{move_world, rescale};
 use super::graph::{State, row};
+use super::observation::Kind;
 use super::setup::Setup;
 use crate::chain::{Convention, JointKind, LINK_PARAMETERS};
 use crate::geometry::{align, nearest_rotation};
@@ -68,8 +69,8 @@ fn given_scale(setup: &Setup, state: &State) -> Option<f64> {
                 .extend(given.map(f64::abs).filter(|given| *given > 0.0 && learned > 0.0).map(|given| given / learned));
         }
     }
-    // A sliding joint has set the unit already.
-    if setup.rig.robot.joints.iter().any(|joint| joint.kind == JointKind::Prismatic) {
+    // A sliding joint or a depth camera has set the unit already.
+    if setup.has(Kind::Points) || setup.rig.robot.joints.iter().any(|joint| joint.kind == JointKind::Prismatic) {
         return None;
     }
     let mut groups: Vec<Vec<(Vector3<f64>, Vector3<f64>)>> = Vec::new();

@@ -1,14 +1,15 @@
 //! What is known and what was measured, side by side: the rig completed by the recording's header, and its observations.
+use super::cameras::{KnownIntrinsics, complete_camera, leave_out_unseen_cameras};
 use super::evaluate::Correspondence;
+use super::observation::{Kind, Observation, Place};
 use super::states::States;
 use crate::Error;
 use crate::camera::{CameraModel, PARAMETERS};
 use crate::chain::LINK_PARAMETERS;
-use crate::recording::{RecordedCamera, Recording, Sample};
+use crate::recording::{Recording, Sample};
 use crate::rig::{Camera, Feature, Joint, Model, ModelCamera, ModelFeature, Parameter, Parent, Rig};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
-use std::collections::BTreeSet;
 
 /// A calibration problem before anything is estimated.
 #[derive(Clone, Debug)]
@@ -23,31 +24,11 @@ pub(crate) struct Setup {
     pub states: States,
     /// Index of every sample in the recording.
     pub samples: Vec<usize>,
-    /// Every detection of a sample that takes part, sample by sample.
+    /// Every detection of a sample that takes part, sample by sample; pixels before points.
     pub observations: Vec<Observation>,
     /// Names of cameras that are left out: their poses are unknown, and no sample with joints has a detection of theirs.
     pub unseen: Vec<String>,
 }
-
-/// One detection; indices are those of [`Setup`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Observation {
-    pub sample: usize,
-    pub camera: usize,
-    pub feature: usize,
-    pub pixel: [f64; 2],
-}
-
-/// Which intrinsics somebody gave, in the rig or in the recording's header.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct KnownIntrinsics {
-    pub focal: bool,
-    pub centre: bool,
-    pub distortion: bool,
-}
-
-/// Focal length [longer side of the image] where nobody gives one.
-const FOCAL_GUESS: f64 = 1.2;
 
 impl Setup {
     /// Puts rig and recording together; fails where they contradict each other.
@@ -60,11 +41,11 @@ impl Setup {
                 rig.cameras.push(Camera { name: recorded.name.clone(), ..Camera::default() });
             }
         }
+        let unseen = leave_out_unseen_cameras(&mut rig, recording);
         for camera in &mut rig.cameras {
             let recorded = recording.cameras.iter().find(|recorded| recorded.name == camera.name);
             intrinsics.push(complete_camera(camera, recorded, recording)?);
         }
-        let unseen = leave_out_unseen_cameras(&mut rig, &mut intrinsics, recording);
         for name in &recording.features {
             if !rig.features.iter().any(|feature| feature.name == *name) {
                 rig.features.push(Feature { name: name.clone(), parent: Parent::Tip, xyz: None });
@@ -76,11 +57,13 @@ impl Setup {
         let (samples, states) = States::new(&rig, recording)?;
         let mut observations = Vec::new();
         for (state, &number) in samples.iter().enumerate() {
-            for detection in &recording.samples[number].pixels {
-                let camera = index.cameras[detection.camera as usize];
-                let feature = index.features[detection.feature as usize];
-                let (Some(camera), Some(feature)) = (camera, feature) else { continue };
-                observations.push(Observation { sample: state, camera, feature, pixel: detection.pixel });
+            let Sample { pixels, points, .. } = &recording.samples[number];
+            let pixels = pixels.iter().map(|one| (one.camera, one.feature, Place::Pixel(one.pixel)));
+            let points = points.iter().map(|one| (one.camera, one.feature, Place::Point(one.point)));
+            for (camera, feature, place) in pixels.chain(points) {
+                let known = (index.cameras[camera as usize], index.features[feature as usize]);
+                let (Some(camera), Some(feature)) = known else { continue };
+                observations.push(Observation { sample: state, camera, feature, place });
             }
         }
         if observations.is_empty() {
@@ -124,9 +107,17 @@ impl Setup {
         variance.sqrt()
     }
 
-    /// Standard deviation of a pixel coordinate [px].
-    pub fn sigma(&self) -> f64 {
-        self.rig.noise.pixels.max(1e-3)
+    /// Standard deviation of a coordinate of a detection [px, or m].
+    pub fn sd(&self, kind: Kind) -> f64 {
+        match kind {
+            Kind::Pixels => self.rig.noise.pixels.max(1e-3),
+            Kind::Points => self.rig.noise.points.max(1e-6),
+        }
+    }
+
+    /// True where some detections are of that kind.
+    pub fn has(&self, kind: Kind) -> bool {
+        self.observations.iter().any(|seen| seen.kind() == kind)
     }
 }
 
@@ -158,83 +149,6 @@ fn name_joints(rig: &mut Rig, recording: &Recording) -> Result<(), Error> {
         )));
     }
     Ok(())
-}
-
-/// Fills in what the header says, and guesses the rest.
-fn complete_camera(
-    camera: &mut Camera,
-    recorded: Option<&RecordedCamera>,
-    recording: &Recording,
-) -> Result<KnownIntrinsics, Error> {
-    let header = recorded.cloned().unwrap_or_default();
-    if recorded.is_some() {
-        camera.size = camera.size.or(header.size);
-        camera.model = camera.model.or(header.model);
-        let same_model = camera.model == header.model || header.model.is_none();
-        camera.fx = camera.fx.or(header.fx);
-        camera.fy = camera.fy.or(header.fy);
-        camera.cx = camera.cx.or(header.cx);
-        camera.cy = camera.cy.or(header.cy);
-        if same_model && camera.distortion.is_none() {
-            camera.distortion = header.distortion;
-        }
-    }
-    let known = KnownIntrinsics {
-        focal: camera.fx.is_some() && camera.fy.is_some(),
-        centre: camera.cx.is_some() && camera.cy.is_some(),
-        distortion: camera.distortion.is_some(),
-    };
-    let model = camera.model.unwrap_or_default();
-    camera.model = Some(model);
-    let coefficients = camera.distortion.get_or_insert_default();
-    if coefficients.len() > model.distortion().len() {
-        return Err(Error::Unusable(format!(
-            "camera `{}` has {} distortion coefficients, its model `{}` takes {}",
-            camera.name,
-            coefficients.len(),
-            model.name(),
-            model.distortion().len()
-        )));
-    }
-    coefficients.resize(model.distortion().len(), 0.0);
-    let [width, height] = match camera.size {
-        Some(size) => size.map(f64::from),
-        None if known.focal && known.centre => [2.0 * camera.cx.unwrap_or(0.0), 2.0 * camera.cy.unwrap_or(0.0)],
-        None => seen_size(camera, recording).ok_or_else(|| {
-            Error::Unusable(format!("camera `{}` has neither a size nor intrinsics nor detections", camera.name))
-        })?,
-    };
-    let focal = FOCAL_GUESS * width.max(height);
-    camera.fx = Some(camera.fx.or(camera.fy).unwrap_or(focal));
-    camera.fy = Some(camera.fy.or(camera.fx).unwrap_or(focal));
-    camera.cx = Some(camera.cx.unwrap_or(0.5 * (width - 1.0)));
-    camera.cy = Some(camera.cy.unwrap_or(0.5 * (height - 1.0)));
-    Ok(known)
-}
-
-/// Takes out cameras that nothing could place, and returns their names.
-fn leave_out_unseen_cameras(
-    rig: &mut Rig,
-    intrinsics: &mut Vec<KnownIntrinsics>,
-    recording: &Recording,
-) -> Vec<String> {
-    let seen = recording.samples.iter().flat_map(|sample| &sample.pixels);
-    let seeing: BTreeSet<&str> = seen.map(|seen| recording.cameras[seen.camera as usize].name.as_str()).collect();
-    let unseen = |camera: &Camera| camera.pose.is_none() && !seeing.contains(camera.name.as_str());
-    let names = rig.cameras.iter().filter(|camera| unseen(camera)).map(|camera| camera.name.clone()).collect();
-    let mut stays = rig.cameras.iter().map(|camera| !unseen(camera)).collect::<Vec<_>>().into_iter();
-    intrinsics.retain(|_| stays.next().unwrap_or(true));
-    rig.cameras.retain(|camera| !unseen(camera));
-    names
-}
-
-/// Size of the smallest image that holds all detections, where nobody gives one.
-fn seen_size(camera: &Camera, recording: &Recording) -> Option<[f64; 2]> {
-    let index = recording.cameras.iter().position(|recorded| recorded.name == camera.name)? as u32;
-    let seen = recording.samples.iter().flat_map(|sample| &sample.pixels).filter(|seen| seen.camera == index);
-    seen.map(|seen| seen.pixel)
-        .reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])
-        .map(|most| most.map(|x| x.max(1.0) + 1.0))
 }
 
 fn is_chain_known(rig: &Rig) -> bool {

@@ -1,5 +1,6 @@
 //! Stages of a calibration as data, and the one way to run them.
 use super::graph::{Built, Freedom, Priors, State, build};
+use super::observation::Kind;
 use super::setup::Setup;
 use super::{Observer, Progress, StageReport};
 use crate::Error;
@@ -44,7 +45,11 @@ impl<'a> Stages<'a> {
     pub fn minimize(&mut self, stage: &Stage<'_>, state: &mut State) -> Result<Report, Error> {
         let started = Instant::now();
         let mut built = self.build(stage, state);
-        let pixels = self.setup.sigma() * (2.0 / built.factors.len().max(1) as f64).sqrt();
+        let coordinates: f64 =
+            built.factors.iter().map(|(index, _)| self.setup.observations[*index].kind().coordinates()).sum();
+        // The root mean square of two coordinates, each of which costs half its square.
+        let pixels = 2.0 * self.setup.sd(Kind::Pixels) / coordinates.max(1.0).sqrt();
+        let has_pixels = self.setup.has(Kind::Pixels);
         let mut solver = Solver::new(&built.graph);
         let minimizer = LevenbergMarquardt { max_iterations: ITERATIONS, ..Default::default() };
         let observer = &mut self.observer;
@@ -53,7 +58,7 @@ impl<'a> Stages<'a> {
                 stage: stage.name,
                 done: iteration.number,
                 of: ITERATIONS,
-                rms_px: Some(pixels * iteration.cost.sqrt()),
+                rms_px: has_pixels.then(|| pixels * iteration.cost.sqrt()),
             })
         })?;
         if report.termination == Termination::Cancelled {

@@ -57,9 +57,11 @@ impl States {
         let mut states = States { chain, ..States::default() };
         let index = Correspondence::new(rig, recording);
         let sees = |sample: &Sample| {
-            sample.pixels.iter().any(|seen| {
-                index.cameras[seen.camera as usize].is_some() && index.features[seen.feature as usize].is_some()
-            })
+            let is_known = |camera: u32, feature: u32| {
+                index.cameras[camera as usize].is_some() && index.features[feature as usize].is_some()
+            };
+            sample.pixels.iter().any(|seen| is_known(seen.camera, seen.feature))
+                || sample.points.iter().any(|seen| is_known(seen.camera, seen.feature))
         };
         let mut taken = Vec::new();
         for (number, sample) in samples.iter().enumerate() {

@@ -1,10 +1,11 @@
 //! States that nothing but their own images tell of, once the rest of the rig is about right.
-use super::evaluate::median;
 use super::graph::{Freedom, State};
-use super::outliers::distances_of;
-use super::setup::{Observation, Setup};
+use super::observation::Kind;
+use super::residuals::median_of_sample;
+use super::setup::Setup;
 use super::stage::Stages;
 use handeye_solvers::{LevenbergMarquardt, Loss, Solver};
+use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
@@ -33,7 +34,7 @@ pub(super) fn place_unknown(state: &mut State, stages: &Stages<'_>) {
         let starts = alike.iter().take(STARTS).map(|&(_, other)| state.joints[other].clone());
         let found = starts.filter_map(|joints| from_start(setup, state, stages, sample, joints));
         if let Some((error, joints)) = found.min_by(|a, b| a.0.total_cmp(&b.0))
-            && error < FOUND * setup.sigma()
+            && error < FOUND
         {
             state.joints[sample] = joints;
             state.placed[sample] = true;
@@ -41,7 +42,7 @@ pub(super) fn place_unknown(state: &mut State, stages: &Stages<'_>) {
     }
 }
 
-/// Median pixel distance and joints of a sample where a start leads.
+/// Median distance [standard deviations] and joints of a sample where a start leads.
 fn from_start(
     setup: &Setup,
     state: &State,
@@ -60,24 +61,25 @@ fn from_start(
     let minimizer = LevenbergMarquardt { max_iterations: ITERATIONS, ..Default::default() };
     minimizer.minimize_with(&mut built.graph, &mut solver, &mut |_| ControlFlow::Continue(())).ok()?;
     built.read(&mut state);
-    let mut distances = distances_of(setup, &state, sample);
-    (!distances.is_empty()).then(|| (median(&mut distances), std::mem::take(&mut state.joints[sample])))
+    let error = median_of_sample(setup, &state, sample)?;
+    Some((error, std::mem::take(&mut state.joints[sample])))
 }
 
-type Image = BTreeMap<(usize, usize), [f64; 2]>;
+/// Where each camera sees each feature [standard deviations].
+type Image = BTreeMap<(usize, usize, Kind), Vector3<f64>>;
 
 /// What every sample's images show.
 fn images(setup: &Setup) -> Vec<Image> {
     let mut images = vec![Image::new(); setup.len()];
-    for &Observation { sample, camera, feature, pixel } in &setup.observations {
-        images[sample].insert((camera, feature), pixel);
+    for seen in &setup.observations {
+        images[seen.sample].insert((seen.camera, seen.feature, seen.kind()), seen.vector() / setup.sd(seen.kind()));
     }
     images
 }
 
-/// Mean pixel distance of what two samples both show; `None` for nothing.
+/// Mean distance of what two samples both show [standard deviations]; `None` for nothing.
 fn apart(a: &Image, b: &Image) -> Option<f64> {
-    let both = a.iter().filter_map(|(key, p)| b.get(key).map(|q| (p[0] - q[0]).hypot(p[1] - q[1])));
+    let both = a.iter().filter_map(|(key, p)| b.get(key).map(|q| (p - q).norm()));
     let (count, sum) = both.fold((0, 0.0), |(count, sum), distance| (count + 1, sum + distance));
     (count > 0).then(|| sum / f64::from(count))
 }

@@ -3,8 +3,11 @@
 //! The residuals of a group of measurements are smaller than its noise, for part of the noise goes into what is estimated. Each
 //! variance is the sum of its squared residuals over its redundancy, n - Σ h, with h the leverage of a measurement: what its own
 //! noise moves its prediction (Förstner 1979).
-use super::graph::{Built, Freedom, Priors, State, Tips};
-use super::outliers::{Verdict, distances};
+use super::graph::State;
+use super::leverage::{PredictedPoints, count_free, leverage_of_priors};
+use super::observation::Kind;
+use super::outliers::Verdict;
+use super::residuals::{distances, whitened};
 use super::stage::{Stage, Stages};
 use crate::factors::Motion;
 use crate::recording::{Recording, Sample};
@@ -68,7 +71,8 @@ pub(super) fn estimate(
 ) -> Result<Noise, Error> {
     let all = Components::new(stages, last, state, verdict)?;
     let mut noise = stages.setup.rig.noise;
-    noise.pixels = all.pixels.sigma(stages.setup.sigma());
+    noise.pixels = all.pixels.sigma(stages.setup.sd(Kind::Pixels));
+    noise.points = all.points.sigma(stages.setup.sd(Kind::Points));
     noise.joints = all.joints.sigma(noise.joints);
     noise.joint_action = all.joint_action.sigma(noise.joint_action);
     noise.pose.rot = all.rot.sigma(noise.pose.rot);
@@ -78,19 +82,21 @@ pub(super) fn estimate(
     Ok(noise)
 }
 
-/// How many coordinates of the pixels in use are left over once everything is estimated.
-pub(super) fn redundancy_of_pixels(
+/// How many coordinates of the pixels in use, and of the points, are left over once everything is estimated.
+pub(super) fn redundancies(
     stages: &Stages<'_>,
     last: &Stage<'_>,
     state: &State,
     verdict: &Verdict,
-) -> Result<f64, Error> {
-    Ok(Components::new(stages, last, state, verdict)?.pixels.redundancy)
+) -> Result<[f64; 2], Error> {
+    let all = Components::new(stages, last, state, verdict)?;
+    Ok([all.pixels.redundancy, all.points.redundancy])
 }
 
 /// Every group of measurements.
 struct Components {
     pixels: Component,
+    points: Component,
     joints: Component,
     joint_action: Component,
     rot: Component,
@@ -111,6 +117,8 @@ impl Components {
                 Some(built.graph.derive(Motion, on))
             })
             .collect();
+        let has_both = setup.has(Kind::Pixels) && setup.has(Kind::Points);
+        let predicted = has_both.then(|| PredictedPoints::new(setup, state, last.freedom, &mut built));
         let free = count_free(last.freedom, &built) + if setup.tool_is_open() { 6 } else { 0 };
         let mut covariance = Covariance::new(&built.graph)?;
         let taken_by_priors = leverage_of_priors(stages.priors, last.freedom, &built, &mut covariance);
@@ -160,22 +168,30 @@ impl Components {
                 taken += add_pose(&mut action_rot, &mut action_xyz, &moved, &action, &block, rot, xyz);
             }
         }
-        // All leverages add up to the number of free coordinates: what is left is that of the pixels.
-        let mut pixels = Component::default();
-        let used = distances(setup, state).into_iter().zip(&verdict.active).filter(|(_, active)| **active);
-        for (distance, _) in used {
-            pixels.add(distance * distance, 2.0, 0.0);
+        // All leverages add up to the number of free coordinates: what is left is that of the pixels, or of the points.
+        let mut seen = [Component::default(); 2];
+        let used = distances(setup, state).into_iter().zip(&setup.observations).zip(&verdict.active);
+        for ((distance, one), _) in used.filter(|(_, active)| **active) {
+            seen[one.kind() as usize].add(distance * distance, one.kind().coordinates(), 0.0);
         }
-        pixels.add(0.0, 0.0, (free as f64 - taken).max(0.0));
-        Ok(Components { pixels, joints, joint_action, rot, xyz, action_rot, action_xyz })
+        let [mut pixels, mut points] = seen;
+        let left = (free as f64 - taken).max(0.0);
+        let of_points = match &predicted {
+            Some(predicted) => predicted.leverage(setup, last, &whitened(setup, state), &mut covariance).min(left),
+            None if setup.has(Kind::Points) => left,
+            None => 0.0,
+        };
+        points.add(0.0, 0.0, of_points);
+        pixels.add(0.0, 0.0, left - of_points);
+        Ok(Components { pixels, points, joints, joint_action, rot, xyz, action_rot, action_xyz })
     }
 }
 
 /// Largest relative change of a standard deviation.
 pub(super) fn change(a: &Noise, b: &Noise) -> f64 {
     let all = |noise: &Noise| {
-        let Noise { pixels, joints, pose, joint_action, pose_action, target: _ } = *noise;
-        [pixels, joints, pose.xyz, pose.rot, joint_action, pose_action.xyz, pose_action.rot]
+        let Noise { pixels, points, joints, pose, joint_action, pose_action, target: _ } = *noise;
+        [pixels, points, joints, pose.xyz, pose.rot, joint_action, pose_action.xyz, pose_action.rot]
     };
     let pairs = all(a).into_iter().zip(all(b));
     pairs.filter(|(a, _)| *a > 0.0).map(|(a, b)| (b / a - 1.0).abs()).fold(0.0, f64::max)
@@ -202,44 +218,4 @@ fn add_pose(
         }
     }
     taken
-}
-
-/// Free coordinates of the rig and of all states in the graph.
-fn count_free(freedom: &Freedom, built: &Built) -> usize {
-    let free = |held: &[bool]| held.iter().filter(|held| !**held).count();
-    let rig = free(&freedom.base)
-        + free(&freedom.parameters)
-        + freedom.cameras.iter().map(|held| free(held)).sum::<usize>()
-        + freedom.intrinsics.iter().map(|held| free(held)).sum::<usize>()
-        + freedom.features.iter().map(|held| free(held)).sum::<usize>();
-    let of_joints = built.joints.iter().zip(&freedom.states).filter(|(key, held)| key.is_some() && !**held).count();
-    let of_tips = match freedom.source {
-        Tips::Chain => 0,
-        _ => built.tips.iter().zip(&freedom.states).filter(|(key, held)| key.is_some() && !**held).count(),
-    };
-    rig + of_joints * (freedom.parameters.len() / crate::chain::LINK_PARAMETERS) + 6 * of_tips
-}
-
-/// What the priors of the rig's numbers decide, in coordinates.
-fn leverage_of_priors(priors: &Priors, freedom: &Freedom, built: &Built, covariance: &mut Covariance<'_>) -> f64 {
-    let mut sum = 0.0;
-    let mut add = |block: nalgebra::DMatrix<f64>, sigmas: &[f64], held: &[bool]| {
-        for (i, (sigma, held)) in sigmas.iter().zip(held).enumerate() {
-            if sigma.is_finite() && !held {
-                sum += block[(i, i)] / (sigma * sigma);
-            }
-        }
-    };
-    if freedom.source == Tips::Chain {
-        add(covariance.of(built.base), &priors.base, &freedom.base);
-        add(covariance.of(built.parameters), &priors.parameters, &freedom.parameters);
-    }
-    for (index, &(pose, intrinsics)) in built.cameras.iter().enumerate() {
-        add(covariance.of(pose), &priors.cameras[index], &freedom.cameras[index]);
-        add(covariance.of(intrinsics), &priors.intrinsics[index], &freedom.intrinsics[index]);
-    }
-    for (index, &feature) in built.features.iter().enumerate() {
-        add(covariance.of(feature), &priors.features[index], &freedom.features[index]);
-    }
-    sum
 }

@@ -6,12 +6,12 @@ use super::inputs::{check_output, read_recordings_with_new, read_rig};
 use super::noise;
 use super::progress::Bar;
 use super::trust;
-use super::words::{cameras_json, count, duration, error_table};
+use super::words::{cameras_json, count, duration, error_table, points_json};
 use clap::Args;
 use handeye::Error;
 use handeye::calibrate::{
-    Calibration, Errors, Finding, NoiseTrial, Options, Progress, Report, TargetReport, TipDeviation, calibrate,
-    relearn, select_noise,
+    Calibration, Distance, Errors, Finding, NoiseTrial, Options, Progress, Report, TargetReport, TipDeviation,
+    calibrate, relearn, select_noise,
 };
 use handeye::report;
 use handeye::rig::Rig;
@@ -50,7 +50,7 @@ pub struct Calibrate {
     /// cameras and features that only the recording has are added
     #[arg(long, value_name = "PATH", requires = "rig", conflicts_with_all = ["select_noise", "folds"])]
     relearn: Vec<String>,
-    /// Estimate the noise of pixels, joints, poses and actions from the data; [noise] of the rig is where that starts
+    /// Estimate the noise of pixels, points, joints, poses and actions from the data; [noise] of the rig is where that starts
     #[arg(long)]
     estimate_noise: bool,
     /// Also report how far leaving out each sample would move the tip, and which samples fit worst
@@ -156,7 +156,7 @@ fn describe(before: &Rig, learned_rig: &Rig, report: &Report, seconds: f64) -> S
         None => text += &error_table(&report.cameras, &together(report), report.rejected).to_string(),
     }
     if let Some(noise) = &report.noise {
-        text += &format!("\nthe noise, estimated from the data: {}\n", noise::in_words(noise));
+        text += &format!("\nthe noise, estimated from the data: {}\n", noise::in_words(noise, recorded(report)));
     }
     if let Some(tip) = &report.tip {
         text += &format!("\nthe tip's position is known to {}\n", tip_in_words(tip));
@@ -210,6 +210,11 @@ fn targets_json(targets: &TargetReport) -> Value {
     })
 }
 
+/// Whether there are pixels, and points.
+fn recorded(report: &Report) -> (bool, bool) {
+    (report.observations > report.points.observations, report.points.observations > 0)
+}
+
 fn together(report: &Report) -> Errors {
     let largest = report.cameras.iter().map(|camera| camera.errors.max_px).fold(0.0, f64::max);
     Errors {
@@ -219,6 +224,7 @@ fn together(report: &Report) -> Errors {
         median_px: report.median_px,
         max_px: largest,
         behind: report.cameras.iter().map(|camera| camera.errors.behind).sum(),
+        points: report.points,
     }
 }
 
@@ -258,6 +264,7 @@ pub fn report_json(report: &Report) -> Value {
         "rms_px": report.rms_px,
         "mean_px": report.mean_px,
         "median_px": report.median_px,
+        "points": points_json(&report.points),
         "cameras": cameras_json(&report.cameras),
         "stages": report.stages.iter().map(stage).collect::<Vec<_>>(),
         "converged": report.converged,
@@ -277,24 +284,31 @@ pub fn report_json(report: &Report) -> Value {
     })
 }
 
+/// Adds a distance as NAME_px or NAME_mm.
+fn with(mut json: Value, name: &str, distance: &Distance) -> Value {
+    match distance {
+        Distance::Pixels(px) => json[format!("{name}_px")] = json!(px),
+        Distance::Metres(m) => json[format!("{name}_mm")] = json!(1e3 * m),
+    }
+    json
+}
+
 fn finding_json(finding: &Finding) -> Value {
     let mut json = match finding {
         Finding::UnseenCamera { camera } => json!({ "kind": "unseen_camera", "camera": camera }),
-        Finding::Misfit { ratio, stated_px } => json!({ "kind": "misfit", "ratio": ratio, "stated_px": stated_px }),
+        Finding::Misfit { ratio, stated } => with(json!({ "kind": "misfit", "ratio": ratio }), "stated", stated),
         Finding::Outliers { count, of } => json!({ "kind": "outliers", "count": count, "of": of }),
-        Finding::WrongJoints { sample, median_px, swapped_with, by_pose } => json!({
-            "kind": "wrong_joints",
-            "read": if *by_pose { "pose" } else { "joints" },
-            "sample": sample,
-            "median_px": median_px,
-            "swapped_with": swapped_with,
-        }),
-        Finding::UnknownState { sample } => json!({ "kind": "unknown_state", "sample": sample }),
-        Finding::WrongImage { sample, camera, median_px } => {
-            json!({ "kind": "wrong_image", "sample": sample, "camera": camera, "median_px": median_px })
+        Finding::WrongJoints { sample, off, swapped_with, by_pose } => {
+            let read = if *by_pose { "pose" } else { "joints" };
+            let json = json!({ "kind": "wrong_joints", "read": read, "sample": sample, "swapped_with": swapped_with });
+            with(json, "median", off)
         }
-        Finding::CameraMoved { camera, largest_px, sample } => {
-            json!({ "kind": "camera_moved", "camera": camera, "largest_px": largest_px, "sample": sample })
+        Finding::UnknownState { sample } => json!({ "kind": "unknown_state", "sample": sample }),
+        Finding::WrongImage { sample, camera, off } => {
+            with(json!({ "kind": "wrong_image", "sample": sample, "camera": camera }), "median", off)
+        }
+        Finding::CameraMoved { camera, largest, sample } => {
+            with(json!({ "kind": "camera_moved", "camera": camera, "sample": sample }), "largest", largest)
         }
     };
     json["text"] = json!(finding.to_string());

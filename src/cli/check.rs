@@ -77,6 +77,7 @@ impl Check {
                 .map(|score| match score.misfit {
                     None => json!({ "alternative": score.alternative }),
                     Some(Misfit::Pixels(px)) => json!({ "alternative": score.alternative, "median_px": px }),
+                    Some(Misfit::Points(m)) => json!({ "alternative": score.alternative, "median_mm": 1e3 * m }),
                     Some(Misfit::Poses { turn, shift }) => {
                         json!({ "alternative": score.alternative, "median_rad": turn, "median_m": shift })
                     }
@@ -140,7 +141,9 @@ fn describe(rig: &Rig, file: &str, counts: &Counts) -> String {
     }
     if let Some(fit) = &rig.fit {
         let (samples, rejected) = (count(fit.samples, "sample"), fit.rejected);
-        text += &format!("  learned   from {samples}, {:.3} px rms, {rejected} detections left out\n", fit.rms_px);
+        let points = fit.rms_points_m.map_or_else(String::new, |rms| format!(", points {:.3} mm rms", 1e3 * rms));
+        text +=
+            &format!("  learned   from {samples}, {:.3} px rms{points}, {rejected} detections left out\n", fit.rms_px);
     }
     text += &format!("\n{}", counts.table());
     for (what, paths) in [("unknown", &counts.unknown), ("held", &counts.held)] {
@@ -158,7 +161,8 @@ fn describe(rig: &Rig, file: &str, counts: &Counts) -> String {
 fn describe_camera(rig: &Rig, camera: &Camera) -> String {
     let size = camera.size.map_or_else(String::new, |[width, height]| format!(", {width} x {height}"));
     let model = camera.model.map_or_else(String::new, |model| format!(", {}", model.name()));
-    format!("{} ({}{model}{size})", camera.name, place(rig, camera.parent))
+    let depth = if camera.depth { ", depth" } else { "" };
+    format!("{} ({}{depth}{model}{size})", camera.name, place(rig, camera.parent))
 }
 
 fn place(rig: &Rig, parent: Parent) -> String {

@@ -1,7 +1,7 @@
 //! `handeye evaluate`: how well a rig predicts a recording.
 use super::answer::Answer;
 use super::inputs::{read_recordings, read_rig};
-use super::words::{cameras_json, count, error_table, errors_json, px};
+use super::words::{cameras_json, count, error_table, errors_json, mm, px};
 use clap::Args;
 use handeye::Error;
 use handeye::calibrate::{Evaluation, evaluate};
@@ -15,7 +15,7 @@ const CONSPICUOUS: f64 = 3.0;
 /// Most samples that are named.
 const NAMED: usize = 5;
 
-/// Predict the pixels of a recording from its joints, and compare
+/// Predict the pixels and points of a recording from its joints, and compare
 ///
 /// A recording that the rig was not learned from tells how good the rig is; its own tells only how well it was fitted.
 #[derive(Args)]
@@ -47,11 +47,15 @@ pub fn json(evaluation: &Evaluation) -> Value {
     object.insert("rejected".to_owned(), json!(evaluation.rejected));
     object.insert("cameras".to_owned(), cameras_json(&evaluation.cameras));
     object.insert("sample_median_px".to_owned(), json!(evaluation.sample_median_px));
+    if evaluation.total.points.observations > 0 {
+        let medians = evaluation.sample_median_m.iter().map(|median| median.map(|m| 1e3 * m));
+        object.insert("sample_median_mm".to_owned(), medians.collect());
+    }
     Value::Object(object)
 }
 
 fn text(evaluation: &Evaluation) -> String {
-    let Evaluation { samples, rejected, total, cameras, sample_median_px } = evaluation;
+    let Evaluation { samples, rejected, total, cameras, sample_median_px, sample_median_m } = evaluation;
     let mut text = format!("predicted {} of {}\n\n", count(total.observations, "detection"), count(*samples, "sample"));
     text += &error_table(cameras, total, *rejected).to_string();
     if *rejected > 0 {
@@ -63,18 +67,23 @@ fn text(evaluation: &Evaluation) -> String {
     if total.behind > 0 {
         text += &format!("\n{} predicted behind the camera\n", count(total.behind, "detection"));
     }
-    let mut conspicuous: Vec<(usize, f64)> = sample_median_px.iter().copied().enumerate().flat_map(pair).collect();
-    conspicuous.retain(|(_, median)| *median > CONSPICUOUS * total.median_px);
-    conspicuous.sort_by(|a, b| b.1.total_cmp(&a.1));
-    if !conspicuous.is_empty() {
-        text += &format!("\n{} far from what is predicted:\n", count(conspicuous.len(), "sample"));
-        for (sample, median) in conspicuous.iter().take(NAMED) {
-            text += &format!("  sample {sample}: {} px in the median\n", px(*median));
-        }
-    }
-    text
+    let pixels = conspicuous(sample_median_px, total.median_px, |median| format!("{} px", px(median)));
+    let points = conspicuous(sample_median_m, total.points.median_m, |median| format!("{} mm", mm(median)));
+    text + &pixels + &points
 }
 
-fn pair((sample, median): (usize, Option<f64>)) -> Option<(usize, f64)> {
-    median.map(|median| (sample, median))
+/// The samples that are far from what is predicted, and how far. `usual`: the median of all.
+fn conspicuous(medians: &[Option<f64>], usual: f64, in_words: impl Fn(f64) -> String) -> String {
+    let pair = |(sample, median): (usize, &Option<f64>)| median.map(|median| (sample, median));
+    let mut far: Vec<(usize, f64)> = medians.iter().enumerate().flat_map(pair).collect();
+    far.retain(|(_, median)| *median > CONSPICUOUS * usual);
+    far.sort_by(|a, b| b.1.total_cmp(&a.1));
+    if far.is_empty() {
+        return String::new();
+    }
+    let mut text = format!("\n{} far from what is predicted:\n", count(far.len(), "sample"));
+    for (sample, median) in far.into_iter().take(NAMED) {
+        text += &format!("  sample {sample}: {} in the median\n", in_words(median));
+    }
+    text
 }

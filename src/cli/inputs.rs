@@ -1,6 +1,6 @@
 //! Reading a rig and the recordings that go with it, and seeing in time that an output can be written.
 use handeye::Error;
-use handeye::recording::Recording;
+use handeye::recording::{Recording, Sample};
 use handeye::rig::{Rig, catalog, matches};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -50,7 +50,11 @@ fn mismatch(input: &RigInput, recording: &Recording, new: &[String]) -> Option<S
     }
     let is_used = |index: usize| {
         let index = index as u32;
-        recording.samples.iter().any(|sample| sample.pixels.iter().any(|detection| detection.camera == index))
+        let is_used = |sample: &Sample| {
+            sample.pixels.iter().any(|seen| seen.camera == index)
+                || sample.points.iter().any(|seen| seen.camera == index)
+        };
+        recording.samples.iter().any(is_used)
     };
     let is_new = |name: &str| new.iter().any(|pattern| matches(pattern, &format!("cameras.{name}.pose")));
     let is_known =

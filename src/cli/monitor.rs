@@ -53,9 +53,11 @@ impl MonitorCommand {
             }
         }
         let watched = recording.samples.len() - skipped;
+        let points: usize = recording.samples.iter().map(|sample| sample.points.len()).sum();
         if watched == 0 {
             let problem = "no sample has joints and an image with three detections of features that the rig knows";
-            return Err(Error::NotEnoughData(format!("{problem}: fewer cannot be told from wrong detections")));
+            let unused = if points > 0 { "; points of depth cameras are not watched" } else { "" };
+            return Err(Error::NotEnoughData(format!("{problem}: fewer cannot be told from wrong detections{unused}")));
         }
         let summary = if changes == 0 { "no change".to_owned() } else { count(changes, "change") };
         text += &format!("{summary} in {}\n", count(watched, "sample"));
@@ -65,6 +67,9 @@ impl MonitorCommand {
                 count(skipped, "sample")
             );
         }
+        if points > 0 {
+            text += &format!("{} of depth cameras not watched: pixels alone are\n", count(points, "point"));
+        }
         let left_out = monitor.left_out().map(|cause| cause.name(&input.rig));
         if let Some(name) = &left_out {
             text += &format!("{name} is left out: too few samples since it moved\n");
@@ -72,6 +77,7 @@ impl MonitorCommand {
         let mut json = json!({
             "samples": watched,
             "skipped": skipped,
+            "points_not_watched": points,
             "changes": changes,
             "false_alarm_rate": self.false_alarms,
             "gradient_norm": monitor.gradient_norm(),

@@ -71,26 +71,32 @@ impl Simulate {
         let recording = &simulation.recording;
         let mut cameras = Map::new();
         for (index, camera) in recording.cameras.iter().enumerate() {
-            let detections = recording.samples.iter().flat_map(|sample| &sample.pixels);
-            let observations = detections.filter(|detection| detection.camera as usize == index).count();
-            cameras.insert(camera.name.clone(), json!({ "observations": observations }));
+            let pixels = recording.samples.iter().flat_map(|sample| &sample.pixels);
+            let points = recording.samples.iter().flat_map(|sample| &sample.points);
+            let pixels = pixels.filter(|seen| seen.camera as usize == index).count();
+            let points = points.filter(|seen| seen.camera as usize == index).count();
+            cameras.insert(camera.name.clone(), json!({ "observations": pixels + points, "points": points }));
         }
-        let observations: usize = recording.samples.iter().map(|sample| sample.pixels.len()).sum();
+        let points: usize = recording.samples.iter().map(|sample| sample.points.len()).sum();
+        let observations = points + recording.samples.iter().map(|sample| sample.pixels.len()).sum::<usize>();
         let json = json!({
             "rig": input.name,
             "samples": recording.samples.len(),
             "observations": observations,
+            "points": points,
             "missed": simulation.missed,
             "outliers": simulation.outliers,
             "cameras": cameras,
             "recording": self.output.display().to_string(),
             "truth": self.truth.as_ref().map(|path| path.display().to_string()),
         });
+        let of_points = format!(" and, of {}, {:.3} mm", count(points, "point"), 1e3 * input.rig.noise.points);
         let text = format!(
-            "{} with {}: {} px noise per axis, {} missed, {} gross outliers\nnext: handeye calibrate {} -o learned.toml\n",
+            "{} with {}: {} px noise per axis{}, {} missed, {} gross outliers\nnext: handeye calibrate {} -o learned.toml\n",
             count(recording.samples.len(), "sample"),
             count(observations, "detection"),
             input.rig.noise.pixels,
+            if points > 0 { of_points } else { String::new() },
             simulation.missed,
             simulation.outliers,
             self.output.display(),

@@ -31,10 +31,13 @@ struct Range {
 }
 
 /// What one camera saw.
+#[derive(Default)]
 struct Seen {
     name: String,
     images: usize,
+    /// Pixels and points.
     detections: usize,
+    points: usize,
     features: usize,
 }
 
@@ -61,7 +64,7 @@ impl Survey {
         }
         let mut seen = vec![0; recording.features.len()];
         for sample in samples {
-            let mut features: Vec<u32> = sample.pixels.iter().map(|detection| detection.feature).collect();
+            let mut features: Vec<u32> = detections(sample).map(|(_, feature)| feature).collect();
             features.sort_unstable();
             features.dedup();
             features.iter().for_each(|feature| seen[*feature as usize] += 1);
@@ -83,8 +86,9 @@ impl Survey {
             (range.name.clone(), json!({ "min": least, "max": largest, "outside_limits": outside }))
         });
         let cameras = self.cameras.iter().map(|seen| {
-            let Seen { images, detections, features, .. } = seen;
-            (seen.name.clone(), json!({ "images": images, "observations": detections, "features": features }))
+            let Seen { images, detections, points, features, .. } = seen;
+            let json = json!({ "images": images, "observations": detections, "points": points, "features": features });
+            (seen.name.clone(), json)
         });
         let shared = self.shared.iter().map(|(a, b, samples, observations)| {
             json!({ "cameras": [a, b], "samples": samples, "observations": observations })
@@ -107,11 +111,15 @@ impl std::fmt::Display for Survey {
         let with: Vec<String> =
             self.with.iter().filter(|(_, n)| *n > 0).map(|(key, n)| format!("{n} with {key}")).collect();
         writeln!(f, "the recording fits: {} ({})\n", count(self.samples, "sample"), with.join(", "))?;
-        let mut table = Table::new(&["camera", "images", "detections", "features", "per image"]);
+        let has_points = self.cameras.iter().any(|seen| seen.points > 0);
+        let points = |cell: String| has_points.then_some(cell);
+        let header = ["camera", "images", "detections"].into_iter().chain(has_points.then_some("points"));
+        let mut table = Table::new(&header.chain(["features", "per image"]).collect::<Vec<_>>());
         for seen in &self.cameras {
             let per_image = seen.detections as f64 / seen.images.max(1) as f64;
-            let counts = [seen.images, seen.detections, seen.features].map(|n| n.to_string());
-            table.row([seen.name.clone()].into_iter().chain(counts).chain([format!("{per_image:.1}")]));
+            let counts = [seen.images, seen.detections].map(|n| n.to_string());
+            let row = [seen.name.clone()].into_iter().chain(counts).chain(points(seen.points.to_string()));
+            table.row(row.chain([seen.features.to_string(), format!("{per_image:.1}")]));
         }
         write!(f, "{table}")?;
         for (a, b, samples, observations) in &self.shared {
@@ -135,23 +143,35 @@ impl std::fmt::Display for Survey {
 }
 
 fn seen_by(recording: &Recording, camera: usize) -> Seen {
-    let (mut images, mut detections, mut features) = (0, 0, std::collections::BTreeSet::new());
+    let mut seen = Seen { name: recording.cameras[camera].name.clone(), ..Seen::default() };
+    let mut features = std::collections::BTreeSet::new();
     for sample in &recording.samples {
-        let seen = sample.pixels.iter().filter(|detection| detection.camera as usize == camera);
-        let before = detections;
-        for detection in seen {
-            detections += 1;
-            features.insert(detection.feature);
+        let of_camera = |one: &u32| *one as usize == camera;
+        let of_sample = detections(sample).filter(|(camera, _)| of_camera(camera)).map(|(_, feature)| feature);
+        let before = seen.detections;
+        for feature in of_sample {
+            seen.detections += 1;
+            features.insert(feature);
         }
-        images += usize::from(detections > before);
+        seen.points += sample.points.iter().filter(|point| of_camera(&point.camera)).count();
+        seen.images += usize::from(seen.detections > before);
     }
-    Seen { name: recording.cameras[camera].name.clone(), images, detections, features: features.len() }
+    seen.features = features.len();
+    seen
+}
+
+/// Camera and feature of every pixel and point.
+fn detections(sample: &Sample) -> impl Iterator<Item = (u32, u32)> + '_ {
+    let pixels = sample.pixels.iter().map(|seen| (seen.camera, seen.feature));
+    pixels.chain(sample.points.iter().map(|seen| (seen.camera, seen.feature)))
 }
 
 /// Features that two cameras see in one sample.
 fn in_common(sample: &Sample, a: u32, b: u32) -> usize {
-    let of = |camera| sample.pixels.iter().filter(move |detection| detection.camera == camera).map(|d| d.feature);
-    of(a).filter(|feature| of(b).any(|other| other == *feature)).count()
+    let of = |camera| -> std::collections::BTreeSet<u32> {
+        detections(sample).filter(|one| one.0 == camera).map(|one| one.1).collect()
+    };
+    of(a).intersection(&of(b)).count()
 }
 
 /// Readings of a joint, where there are any.

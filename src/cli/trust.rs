@@ -1,5 +1,6 @@
 //! How much of a calibration to trust, for people and for programs.
 use super::table::Table;
+use super::words::{mm, px};
 use handeye::calibrate::{Combination, DeterminedBy, Influence, Report, most_influential, worst_fitting};
 use handeye::rig::Rig;
 use serde_json::{Value, json};
@@ -13,6 +14,7 @@ pub fn text(report: &Report) -> String {
         return String::new();
     }
     let is_metric = report.tip.is_some_and(|tip| tip.metric);
+    let has_points = report.points.observations > 0;
     let mut text = String::new();
     for (title, samples) in [
         ("the most influential samples", most_influential(&report.influence, LISTED)),
@@ -21,15 +23,17 @@ pub fn text(report: &Report) -> String {
         if samples.is_empty() {
             continue;
         }
-        let mut table = Table::new(&["sample", "without it the tip moves", "rms px"]);
-        for Influence { sample, tip, rms_px } in samples {
+        let header = ["sample", "without it the tip moves", "rms px"].into_iter().chain(has_points.then_some("rms mm"));
+        let mut table = Table::new(&header.collect::<Vec<_>>());
+        for Influence { sample, tip, rms_px, rms_points_m, .. } in samples {
             let tip = match tip {
                 Some(tip) if !tip.is_finite() => "nothing holds it".to_owned(),
                 Some(tip) if is_metric => format!("{:.4} mm", 1e3 * tip),
                 Some(tip) => format!("{tip:.2e}"),
                 None => "-".to_owned(),
             };
-            table.row([sample.to_string(), tip, format!("{rms_px:.3}")]);
+            let row = [sample.to_string(), tip, px(rms_px)].into_iter();
+            table.row(row.chain(has_points.then(|| mm(rms_points_m))));
         }
         text += &format!("\n{title} (numbered from 0):\n{table}");
     }
@@ -80,7 +84,10 @@ pub fn influence_json(all: &[Influence]) -> Value {
         return Value::Null;
     }
     let list = |samples: Vec<Influence>| -> Vec<Value> {
-        let one = |one: Influence| json!({ "sample": one.sample, "tip": one.tip, "rms_px": one.rms_px });
+        let one = |one: Influence| {
+            let (px, mm) = (one.rms_px, 1e3 * one.rms_points_m);
+            json!({ "sample": one.sample, "tip": one.tip, "rms_px": px, "rms_points_mm": mm })
+        };
         samples.into_iter().map(one).collect()
     };
     json!({

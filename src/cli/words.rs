@@ -1,6 +1,6 @@
 //! Numbers and lists as people read them, and the errors that several commands report.
 use super::table::Table;
-use handeye::calibrate::{CameraErrors, Errors};
+use handeye::calibrate::{CameraErrors, Errors, PointErrors};
 use serde_json::{Map, Value, json};
 
 /// "1 sample", "2 samples".
@@ -20,6 +20,11 @@ pub fn px(value: f64) -> String {
     format!("{value:.3}")
 }
 
+/// Metres as millimetres, with as many digits as can matter.
+pub fn mm(value: f64) -> String {
+    format!("{:.3}", 1e3 * value)
+}
+
 /// A time as people tell it.
 pub fn duration(seconds: f64) -> String {
     if seconds < 1.0 { format!("{:.0} ms", 1e3 * seconds) } else { format!("{seconds:.1} s") }
@@ -27,20 +32,64 @@ pub fn duration(seconds: f64) -> String {
 
 /// Errors per camera and together, one row each.
 pub fn error_table(cameras: &[CameraErrors], together: &Errors, rejected: usize) -> Table {
-    let mut table = Table::new(&["camera", "detections", "left out", "rms px", "mean px", "median px", "largest px"]);
-    let row = |name: &str, errors: &Errors, rejected: usize| {
-        let pixels = [errors.rms_px, errors.mean_px, errors.median_px, errors.max_px].map(px);
-        let counts = [errors.observations.to_string(), rejected.to_string()];
-        [name.to_owned()].into_iter().chain(counts).chain(pixels).collect::<Vec<_>>()
+    let columns = ErrorColumns::new(together);
+    let mut table = Table::new(&[&["camera", "detections", "left out"][..], &columns.header()].concat());
+    let mut row = |name: &str, errors: &Errors, rejected: usize| {
+        let counts = [name.to_owned(), errors.observations.to_string(), rejected.to_string()];
+        table.row(counts.into_iter().chain(columns.cells(errors)));
     };
     for camera in cameras {
-        table.row(row(&camera.name, &camera.errors, camera.rejected));
+        row(&camera.name, &camera.errors, camera.rejected);
     }
-    table.row(row("together", together, rejected));
+    row("together", together, rejected);
     table
 }
 
-/// The keys that every report of errors has.
+/// Columns of errors: of pixels, of points, or of both.
+pub struct ErrorColumns {
+    pixels: bool,
+    points: bool,
+}
+
+impl ErrorColumns {
+    /// For a table of which these are the errors of all.
+    pub fn new(together: &Errors) -> Self {
+        let points = together.points.observations > 0;
+        ErrorColumns { pixels: !points || has_pixels(together), points }
+    }
+
+    pub fn header(&self) -> Vec<&'static str> {
+        let pixels = ["rms px", "mean px", "median px", "largest px"].into_iter().filter(|_| self.pixels);
+        let points = ["points", "rms mm", "mean mm", "median mm", "largest mm"].into_iter().filter(|_| self.points);
+        pixels.chain(points).collect()
+    }
+
+    pub fn cells(&self, errors: &Errors) -> Vec<String> {
+        let points = &errors.points;
+        let mut cells = Vec::new();
+        if self.pixels {
+            let pixels = [errors.rms_px, errors.mean_px, errors.median_px, errors.max_px].map(px);
+            cells.extend(if has_pixels(errors) || !self.points { pixels } else { dashes() });
+        }
+        if self.points {
+            cells.push(points.observations.to_string());
+            let lengths = [points.rms_m, points.mean_m, points.median_m, points.max_m].map(mm);
+            cells.extend(if points.observations > 0 { lengths } else { dashes() });
+        }
+        cells
+    }
+}
+
+fn has_pixels(errors: &Errors) -> bool {
+    errors.observations > errors.points.observations
+}
+
+/// Cells of what there is nothing of.
+fn dashes() -> [String; 4] {
+    std::array::from_fn(|_| "-".to_owned())
+}
+
+/// The keys that every report of errors has, and `points` where there are any.
 pub fn errors_json(errors: &Errors) -> Map<String, Value> {
     let pairs = [
         ("observations", json!(errors.observations)),
@@ -50,7 +99,17 @@ pub fn errors_json(errors: &Errors) -> Map<String, Value> {
         ("max_px", json!(errors.max_px)),
         ("behind", json!(errors.behind)),
     ];
-    pairs.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+    let points = (errors.points.observations > 0).then(|| ("points", points_json(&errors.points)));
+    pairs.into_iter().chain(points).map(|(key, value)| (key.to_owned(), value)).collect()
+}
+
+/// Distances of points; null where there are none.
+pub fn points_json(points: &PointErrors) -> Value {
+    if points.observations == 0 {
+        return Value::Null;
+    }
+    let [rms, mean, median, max] = [points.rms_m, points.mean_m, points.median_m, points.max_m].map(|m| 1e3 * m);
+    json!({ "observations": points.observations, "rms_mm": rms, "mean_mm": mean, "median_mm": median, "max_mm": max })
 }
 
 /// Camera -> its errors.

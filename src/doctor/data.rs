@@ -98,12 +98,16 @@ fn distances(rig: &Rig, recording: &Recording) -> Vec<Finding> {
     let far = |mut lengths: Vec<f64>| !lengths.is_empty() && crate::calibrate::median(&mut lengths) > FAR;
     let samples = &recording.samples;
     let mut findings = Vec::new();
-    let mut add = |what: String| findings.push(Finding { what, change: "divide their positions by 1000".into() });
+    let mut add = |what: &str, change: &str| findings.push(Finding { what: what.into(), change: change.into() });
+    let positions = "divide their positions by 1000";
     if far(samples.iter().filter_map(|sample| sample.pose).map(|pose| pose.translation.norm()).collect()) {
-        add("robot poses are in millimetres".into());
+        add("robot poses are in millimetres", positions);
     }
     if far(samples.iter().flat_map(|sample| &sample.targets).map(|seen| seen.pose.translation.norm()).collect()) {
-        add("target poses are in millimetres".into());
+        add("target poses are in millimetres", positions);
+    }
+    if far(samples.iter().flat_map(|sample| &sample.points).map(|seen| Vector3::from(seen.point).norm()).collect()) {
+        add("points of depth cameras are in millimetres", "divide them by 1000");
     }
     for (index, joint) in rig.robot.joints.iter().enumerate().filter(|(_, joint)| joint.kind == JointKind::Prismatic) {
         let read: Vec<f64> = samples.iter().filter_map(|s| Some(s.joints.as_ref()?.get(index)?.abs())).collect();

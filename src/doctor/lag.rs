@@ -1,4 +1,5 @@
 //! A lag between the clocks of robot and images, where samples are dense enough to interpolate joints between them.
+use super::pixels::{learn, misfit};
 use crate::calibrate::{Options, evaluate};
 use crate::recording::{Recording, Sample};
 use crate::rig::Rig;
@@ -25,14 +26,14 @@ pub(super) fn find(rig: &Rig, recording: &Recording, options: &Options) -> Optio
     let period = period(recording)?;
     let mut lag = Lag { seconds: 0.0, recording: recording.clone() };
     for _ in 0..ROUNDS {
-        let learned = super::pixels::learn(rig, &lag.recording, options).ok()?;
-        let misfit = |k: i32| {
+        let learned = learn(rig, &lag.recording, options).ok()?;
+        let misfit_at = |k: i32| {
             let shifted = interpolated(recording, f64::from(k) * STEP * period);
-            evaluate(&learned.rig, &shifted).map_or(f64::INFINITY, |judged| judged.total.median_px)
+            evaluate(&learned.rig, &shifted).map_or(f64::INFINITY, |judged| misfit(&judged.total).size())
         };
         let most = (PERIODS / STEP).round() as i32;
         let best = (-most..=most)
-            .map(|k| (misfit(k), k))
+            .map(|k| (misfit_at(k), k))
             .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.abs().cmp(&b.1.abs())))?;
         let seconds = f64::from(best.1) * STEP * period;
         let settled = seconds == lag.seconds;

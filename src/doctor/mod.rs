@@ -25,6 +25,8 @@ const SHIFT: f64 = 0.005;
 pub enum Misfit {
     /// Distance of detections from where the rig learned under the hypothesis predicts them [px].
     Pixels(f64),
+    /// Distance of depth cameras' points likewise [m], where nothing else was seen.
+    Points(f64),
     /// Disagreement of the robot's and the target's motions.
     Poses {
         /// Angle [rad].
@@ -66,7 +68,7 @@ pub struct Diagnosis {
 /// Examines a recording: units, inverted poses, orders of quaternions, pairing of rows and images, time lag, image axes,
 /// principal points, the side of the robot that cameras are on, repeated samples, rotations that are all about one axis.
 ///
-/// Targets and tip poses are compared in closed form. Pixels take a whole calibration per alternative, most of them only where
+/// Targets and tip poses are compared in closed form. Pixels and points take a whole calibration per alternative, most of them only where
 /// the data as recorded are not explained to about their noise. Never fails: what could not be done is in the diagnosis.
 pub fn examine(rig: &Rig, recording: &Recording, options: &calibrate::Options) -> Diagnosis {
     let tips = tips(rig, recording, f64::to_owned);
@@ -78,7 +80,7 @@ pub fn examine(rig: &Rig, recording: &Recording, options: &calibrate::Options) -
         let in_degrees = (!has_poses).then(|| self::tips(rig, recording, |reading| reading.to_radians()));
         pairs.examine(in_degrees.as_deref(), &mut diagnosis.scores, &mut diagnosis.findings);
     }
-    let is_seen = |sample: &crate::recording::Sample| !sample.pixels.is_empty();
+    let is_seen = |sample: &crate::recording::Sample| !sample.pixels.is_empty() || !sample.points.is_empty();
     let is_read = |sample: &crate::recording::Sample| sample.joints.is_some() || sample.pose.is_some();
     if recording.samples.iter().any(|sample| is_seen(sample) && is_read(sample)) {
         pixels::examine(rig, recording, options, &mut diagnosis);
@@ -115,10 +117,11 @@ fn is_clearly_better(misfit: Option<Misfit>, as_recorded: Option<Misfit>) -> boo
 }
 
 impl Misfit {
-    /// Pixels, or turn and shift weighed against each other: comparable among misfits of one kind.
+    /// Pixels, metres, or turn and shift weighed against each other: comparable among misfits of one kind.
     fn size(&self) -> f64 {
         match self {
             Misfit::Pixels(px) => *px,
+            Misfit::Points(m) => *m,
             Misfit::Poses { turn, shift } => (turn / TURN).hypot(shift / SHIFT),
         }
     }
@@ -136,6 +139,7 @@ impl std::fmt::Display for Misfit {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Misfit::Pixels(px) => write!(f, "{px:.3} px"),
+            Misfit::Points(m) => write!(f, "{:.3} mm", 1e3 * m),
             Misfit::Poses { turn, shift } => write!(f, "{:.2}°, {:.2} mm", turn.to_degrees(), 1e3 * shift),
         }
     }

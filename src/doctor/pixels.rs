@@ -1,15 +1,17 @@
-//! Which reading of joints or tip poses explains the pixels: a calibration per alternative.
+//! Which reading of joints or tip poses explains the pixels and points: a calibration per alternative.
 use super::alternatives::{self, Alternative};
 use super::images::{self, Axes};
 use super::{Diagnosis, Finding, Misfit, Score, is_clearly_better, lag};
 use crate::Error;
-use crate::calibrate::{self, Calibration, Finding as Unfit, calibrate, evaluate};
+use crate::calibrate::{self, Calibration, Errors, Finding as Unfit, calibrate, evaluate};
 use crate::recording::Recording;
-use crate::rig::Rig;
+use crate::rig::{Noise, Rig};
 use std::ops::ControlFlow;
 
-/// Up to this many standard deviations of a pixel coordinate the median distance is explained by noise (1.18 is its mean).
+/// Up to this many standard deviations of a coordinate the median distance is explained by noise: of pixels, where 1.18 is its
+/// mean, and of points, where 1.54 is.
 const NOISE: f64 = 2.0;
+const NOISE_OF_POINTS: f64 = 2.6;
 
 /// A lag is told from a shift by whole samples where its misfit is below this share of the shift's.
 const FINER: f64 = 0.8;
@@ -56,19 +58,17 @@ pub(super) fn examine(rig: &Rig, recording: &Recording, options: &calibrate::Opt
         let reference = *reference.get_or_insert_with(|| as_held(as_recorded));
         consider(alternative, misfit, reference, &mut best, diagnosis);
     }
-    let explained = NOISE * rig.noise.pixels;
-    let is_explained = as_recorded.is_some_and(|misfit| misfit.size() <= explained);
-    let is_fine = best.as_ref().is_some_and(|(misfit, _)| misfit.size() <= explained);
-    if !is_fine && !is_explained {
+    let explains = |misfit: &Misfit| is_explained(misfit, &rig.noise);
+    let is_fine = |best: &Option<(Misfit, Finding)>| best.as_ref().is_some_and(|(misfit, _)| explains(misfit));
+    if !is_fine(&best) && !as_recorded.as_ref().is_some_and(explains) {
         for alternative in alternatives::all(rig, recording) {
             let misfit = score(&alternative.rig, &alternative.recording, options);
             consider(alternative, misfit, as_recorded, &mut best, diagnosis);
-            if best.as_ref().is_some_and(|(misfit, _)| misfit.size() <= explained) {
+            if is_fine(&best) {
                 break;
             }
         }
-        let is_fine = best.as_ref().is_some_and(|(misfit, _)| misfit.size() <= explained);
-        if let Some(lag) = (!is_fine).then(|| lag::find(rig, recording, options)).flatten() {
+        if let Some(lag) = (!is_fine(&best)).then(|| lag::find(rig, recording, options)).flatten() {
             let misfit = score(rig, &lag.recording, options);
             let (by, side) = (lag.seconds.abs(), if lag.seconds > 0.0 { "late" } else { "early" });
             let name = format!("joints are stamped {by:.3} s too {side}");
@@ -132,6 +132,24 @@ fn score(rig: &Rig, recording: &Recording, options: &calibrate::Options) -> Opti
 
 /// How well a learned rig explains all of a recording.
 fn median(rig: &Rig, recording: &Recording) -> Option<Misfit> {
-    let median_px = evaluate(rig, recording).ok()?.total.median_px;
-    median_px.is_finite().then_some(Misfit::Pixels(median_px))
+    let misfit = misfit(&evaluate(rig, recording).ok()?.total);
+    misfit.size().is_finite().then_some(misfit)
+}
+
+/// The median of pixels, or of points where there are no pixels.
+pub(super) fn misfit(errors: &Errors) -> Misfit {
+    if errors.observations > errors.points.observations {
+        Misfit::Pixels(errors.median_px)
+    } else {
+        Misfit::Points(errors.points.median_m)
+    }
+}
+
+/// True where noise explains it.
+fn is_explained(misfit: &Misfit, noise: &Noise) -> bool {
+    match misfit {
+        Misfit::Pixels(px) => *px <= NOISE * noise.pixels,
+        Misfit::Points(m) => *m <= NOISE_OF_POINTS * noise.points,
+        Misfit::Poses { .. } => false,
+    }
 }

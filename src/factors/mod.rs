@@ -2,6 +2,7 @@
 mod forward_kinematics;
 mod joint_action;
 mod joint_reading;
+mod point_observation;
 mod pose_action;
 mod pose_reading;
 mod readings;
@@ -11,6 +12,7 @@ mod target;
 pub use forward_kinematics::ForwardKinematics;
 pub use joint_action::JointAction;
 pub use joint_reading::JointReading;
+pub use point_observation::{InCamera, PointObservation};
 pub use pose_action::{Motion, PoseAction};
 pub use pose_reading::PoseReading;
 pub use readings::{JointReadings, Polynomial, PoseReadings};

@@ -107,7 +107,8 @@ fn lens<const N: usize>(model: CameraModel, distortion: &[f64], in_camera: &Vect
     (lifted.map(|value| value.value()), lifted.map(|value| derivatives(&value)))
 }
 
+/// A row by a pose's step: its rotation, then its translation.
 #[inline]
-fn write(columns: &mut [f64], w: Vector3<f64>, v: Vector3<f64>) {
+pub(super) fn write(columns: &mut [f64], w: Vector3<f64>, v: Vector3<f64>) {
     columns.copy_from_slice(&[w.x, w.y, w.z, v.x, v.y, v.z]);
 }

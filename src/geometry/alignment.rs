@@ -2,6 +2,13 @@
 use super::rotation::nearest_rotation_and_trace;
 use handeye_solvers::Pose;
 use nalgebra::{Matrix3, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Triples that are tried among wrong points, and the share of the median distance below which one is better than all points
+/// together: of good points alone, all do best.
+const TRIPLES: usize = 30;
+const CLEARLY: f64 = 0.5;
 
 /// A rigid motion with a scale: p ↦ s R p + t.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +44,37 @@ pub fn align_similarity(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Si
     let (rotation, trace) = nearest_rotation_and_trace(&moments.covariance)?;
     let scale = trace / moments.variance;
     (scale > 0.0 && scale.is_finite()).then(|| Similarity { scale, pose: moments.pose(rotation, scale) })
+}
+
+/// The same as [`align`] where up to a third of the points are wrong: the triple with the least median distance, then all points
+/// within three times that.
+pub fn align_robust(from: &[Vector3<f64>], to: &[Vector3<f64>], seed: u64) -> Option<Pose> {
+    let distances = |pose: &Pose| -> Vec<f64> {
+        from.iter().zip(to).map(|(from, to)| (pose.transform(from) - to).norm()).collect()
+    };
+    let middle = |pose: &Pose| {
+        let mut sorted = distances(pose);
+        sorted.sort_by(f64::total_cmp);
+        0.5 * (sorted[(sorted.len() - 1) / 2] + sorted[sorted.len() / 2])
+    };
+    let mut best = align(from, to)?;
+    if from.len() > 3 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        for _ in 0..TRIPLES {
+            let three: [usize; 3] = std::array::from_fn(|_| random.random_range(0..from.len()));
+            if let Some(pose) = align(&three.map(|i| from[i]), &three.map(|i| to[i]))
+                && middle(&pose) < CLEARLY * middle(&best)
+            {
+                best = pose;
+            }
+        }
+        let limit = 3.0 * middle(&best);
+        let near: Vec<usize> =
+            distances(&best).into_iter().enumerate().filter(|(_, d)| *d <= limit).map(|(i, _)| i).collect();
+        let pick = |points: &[Vector3<f64>]| near.iter().map(|&i| points[i]).collect::<Vec<_>>();
+        best = align(&pick(from), &pick(to)).unwrap_or(best);
+    }
+    Some(best)
 }
 
 /// What of two sets of points determines their alignment.
@@ -104,6 +142,19 @@ mod tests {
             sum += from.iter().zip(&to).map(|(p, q)| (found.transform(p) - q).norm_squared()).sum::<f64>();
         }
         assert!((sum / (sigma * sigma) - 5400.0).abs() < 3.0 * 104.0);
+    }
+
+    // Wrong points are anywhere in the cube; with 30 triples, none is free of them in (1 - (2/3)³)³⁰ = 3e-5 of all cases.
+    #[test]
+    fn a_third_of_wrong_points_does_not_spoil_the_motion() {
+        for seed in 0..100 {
+            let (truth, from, mut to) = exact(seed, 12);
+            let mut random = Random::new(1000 + seed);
+            to.iter_mut().for_each(|p| *p += random.gaussian(1e-3));
+            to.iter_mut().take(4).for_each(|p| *p = random.vector(2.0));
+            let found = align_robust(&from, &to, seed).unwrap();
+            assert!(distance(&found, &truth) < 5e-3, "seed {seed}: {}", distance(&found, &truth));
+        }
     }
 
     #[test]

@@ -19,7 +19,7 @@ mod rotation;
 mod sampson;
 mod triangulation;
 
-pub use alignment::{Similarity, align, align_similarity};
+pub use alignment::{Similarity, align, align_robust, align_similarity};
 pub use daniilidis::hand_eye_daniilidis;
 pub use essential::{decompose, essential, in_front_of_both};
 pub use five_point::five_point;

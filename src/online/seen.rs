@@ -1,6 +1,6 @@
 //! A sample as a rig sees it: its joints, and detections with the rig's own indices.
 use crate::recording::{Recording, Sample};
-use crate::rig::Rig;
+use crate::rig::{Camera, Rig};
 use std::collections::BTreeMap;
 
 /// A sample that can be compared.
@@ -29,7 +29,10 @@ pub(super) struct Names {
 
 impl Names {
     pub fn new(rig: &Rig, header: &Recording) -> Names {
-        let camera = |name: &str| rig.cameras.iter().position(|camera| camera.name == name);
+        let camera = |name: &str| {
+            let is_it = |camera: &Camera| camera.name == name && !camera.gives_points_alone();
+            rig.cameras.iter().position(is_it)
+        };
         let features: BTreeMap<&str, usize> =
             rig.features.iter().enumerate().map(|(index, feature)| (feature.name.as_str(), index)).collect();
         Names {

@@ -1,6 +1,6 @@
 //! What the cameras of a complete rig see of its features.
 use crate::Error;
-use crate::recording::Detection;
+use crate::recording::{Detection, PointDetection};
 use crate::rig::{Camera, Model, ModelCamera, Rig};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
@@ -13,6 +13,8 @@ const SAME_DIRECTION: f64 = 1.0 - 1e-9;
 /// The cameras, their images, and how much of the features has to be in them.
 pub(crate) struct Views<'a> {
     pub model: &'a Model,
+    /// Which of them give points too.
+    depth: Vec<bool>,
     sizes: Vec<[f64; 2]>,
     pub need: Need,
     /// For every feature, in its parent's frame, where cameras have to be to see it; `None` where that is everywhere.
@@ -63,7 +65,8 @@ impl<'a> Views<'a> {
                 return Err(Error::Unusable(format!("the rig has no {what}, so nothing would be seen")));
             }
         }
-        Ok(Views { model, sizes: sizes(rig)?, need, cones: vec![None; rig.features.len()] })
+        let depth = rig.cameras.iter().map(|camera| camera.depth).collect();
+        Ok(Views { model, depth, sizes: sizes(rig)?, need, cones: vec![None; rig.features.len()] })
     }
 
     /// The same where features are seen from the side from which they were seen before, such as the front of a board.
@@ -96,6 +99,17 @@ impl<'a> Views<'a> {
             }
         }
         detections
+    }
+
+    /// Exact points of what depth cameras have in view, of these detections.
+    pub fn points(&self, joints: &[f64], detections: &[Detection]) -> Vec<PointDetection> {
+        let links = self.model.links(joints);
+        let seen = detections.iter().filter(|seen| self.depth[seen.camera as usize]);
+        seen.map(|&Detection { camera, feature, .. }| {
+            let point = self.model.in_camera(camera as usize, feature as usize, &links).into();
+            PointDetection { camera, feature, point }
+        })
+        .collect()
     }
 
     /// By how much a position misses what has to be in view. `in_view`: how many features each camera sees.
@@ -159,9 +173,13 @@ pub(crate) fn pixel_inside(camera: &ModelCamera, [width, height]: [f64; 2], poin
 
 /// Width and height of every camera's images [px].
 ///
-/// Errors: [`Error::Unusable`] where one is not known.
+/// Errors: [`Error::Unusable`] where one is not known, or a depth camera has no lens.
 pub(crate) fn sizes(rig: &Rig) -> Result<Vec<[f64; 2]>, Error> {
     let size = |camera: &Camera| match camera.size {
+        _ if camera.gives_points_alone() => Err(Error::Unusable(format!(
+            "depth camera `{}` has no intrinsics, and nothing says what is in its view: give fx, fy, cx and cy",
+            camera.name
+        ))),
         Some(size) => Ok(size.map(f64::from)),
         None => Err(Error::Unusable(format!(
             "the rig is not complete: it has no value for `size` of camera `{}`",

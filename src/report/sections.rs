@@ -14,10 +14,15 @@ const DRAWN: usize = 4;
 pub(super) fn summary(page: &mut Page, subject: &Subject<'_>) {
     let report = &subject.calibration.report;
     page.section("summary", "How good it is");
-    let mut figures = vec![
-        (format!("{:.3} px", report.rms_px), "root mean square of the pixel distances"),
-        (format!("{:.3} px", report.median_px), "median pixel distance"),
-    ];
+    let mut figures = Vec::new();
+    if report.observations > report.points.observations {
+        figures.push((format!("{:.3} px", report.rms_px), "root mean square of the pixel distances"));
+        figures.push((format!("{:.3} px", report.median_px), "median pixel distance"));
+    }
+    if report.points.observations > 0 {
+        let figure = format!("{:.3} mm", 1e3 * report.points.rms_m);
+        figures.push((figure, "root mean square of the distances of depth cameras' points"));
+    }
     if let Some(tip) = report.tip {
         let figure = if tip.metric { format!("{:.3} mm", 1e3 * tip.median) } else { format!("{:.1e}", tip.median) };
         figures.push((
@@ -51,15 +56,17 @@ pub(super) fn summary(page: &mut Page, subject: &Subject<'_>) {
 pub(super) fn cameras(page: &mut Page, subject: &Subject<'_>, residuals: &[Residual]) {
     let (rig, report) = (&subject.calibration.rig, &subject.calibration.report);
     page.section("cameras", "Cameras");
+    let has_points = report.points.observations > 0;
     let row = |CameraErrors { name, errors, rejected }: &CameraErrors| {
         let px = [errors.rms_px, errors.mean_px, errors.median_px, errors.max_px].map(|px| format!("{px:.3}"));
-        [name.clone(), errors.observations.to_string(), rejected.to_string()].into_iter().chain(px).collect::<Vec<_>>()
+        let counts = [name.clone(), errors.observations.to_string(), rejected.to_string()];
+        let points = [errors.points.observations.to_string(), format!("{:.3}", 1e3 * errors.points.rms_m)];
+        counts.into_iter().chain(px).chain(points.into_iter().filter(|_| has_points)).collect::<Vec<_>>()
     };
     let rows: Vec<Vec<String>> = report.cameras.iter().map(row).collect();
-    page.table(
-        &["camera", "detections", "left out", "rms px", "mean px", "median px", "largest px"],
-        rows.iter().map(Vec::as_slice),
-    );
+    let mut header = vec!["camera", "detections", "left out", "rms px", "mean px", "median px", "largest px"];
+    header.extend(["points", "rms mm"].into_iter().filter(|_| has_points));
+    page.table(&header, rows.iter().map(Vec::as_slice));
     let sd = scale(report.median_px);
     for (index, camera) in rig.cameras.iter().enumerate() {
         let own: Vec<&Residual> = residuals.iter().filter(|residual| residual.camera == index).collect();

@@ -26,7 +26,7 @@ pub struct Model {
 pub struct ModelCamera {
     /// Its lens.
     pub model: CameraModel,
-    /// fx, fy, cx, cy [px] and 8 distortion coefficients.
+    /// fx, fy, cx, cy [px] and 8 distortion coefficients; zeros for a depth camera that gives points alone.
     pub intrinsics: [f64; PARAMETERS],
     /// What it is fixed to.
     pub parent: Parent,
@@ -43,8 +43,16 @@ pub struct ModelFeature {
     pub xyz: Vector3<f64>,
 }
 
+impl ModelCamera {
+    /// True where it has a lens, so that it gives pixels; false for a depth camera that gives points alone.
+    pub fn has_lens(&self) -> bool {
+        self.intrinsics[0] != 0.0
+    }
+}
+
 impl Model {
-    /// From a rig in which every value is given; a base that is left out is the identity, a `beta` 0, a distortion none.
+    /// From a rig in which every value is given; a base that is left out is the identity, a `beta` 0, a distortion none, and
+    /// a depth camera's intrinsics may be missing.
     /// Fails with the paths of what is missing.
     pub fn new(rig: &Rig) -> Result<Model, Error> {
         let mut missing = Vec::new();
@@ -66,7 +74,7 @@ impl Model {
         for camera in &rig.cameras {
             let mut intrinsics = [0.0; PARAMETERS];
             let fields = [("fx", camera.fx), ("fy", camera.fy), ("cx", camera.cx), ("cy", camera.cy)];
-            for (slot, (name, value)) in intrinsics.iter_mut().zip(fields) {
+            for (slot, (name, value)) in intrinsics.iter_mut().zip(fields).filter(|_| !camera.gives_points_alone()) {
                 *slot = need(value, &|| format!("cameras.{}.{name}", camera.name));
             }
             let distortion = camera.distortion.as_deref().unwrap_or_default();

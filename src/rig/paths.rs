@@ -124,7 +124,8 @@ impl Parameter {
 impl Rig {
     /// Everything that can be learned of this rig: base, joints, cameras, features, targets, each in the file's order.
     ///
-    /// Left out are the `beta` of joints that have none and the distortion of cameras whose model has none.
+    /// Left out are the `beta` of joints that have none, the distortion of cameras whose model has none, and the intrinsics of
+    /// depth cameras that have none.
     pub fn parameters(&self) -> Vec<Parameter> {
         let mut parameters = vec![Parameter::Base];
         for (index, joint) in self.robot.joints.iter().enumerate() {
@@ -133,6 +134,9 @@ impl Rig {
         }
         for (index, camera) in self.cameras.iter().enumerate() {
             parameters.push(Parameter::CameraPose(index));
+            if camera.gives_points_alone() {
+                continue;
+            }
             let distorts = camera.model.is_some_and(|model| !model.distortion().is_empty())
                 || camera.distortion.as_ref().is_some_and(|coefficients| !coefficients.is_empty());
             let fields = CameraField::ALL.iter().filter(|field| **field != CameraField::Distortion || distorts);

@@ -103,6 +103,8 @@ pub struct Camera {
     pub cy: Option<f64>,
     /// Distortion coefficients; fewer than the model has are followed by zeros.
     pub distortion: Option<Vec<f64>>,
+    /// True for a depth camera, which gives features as points in its frame. Where it has no intrinsics, it gives nothing else.
+    pub depth: bool,
     /// What it is fixed to.
     pub parent: Parent,
     /// `parent_from_camera`.
@@ -136,6 +138,8 @@ pub struct Target {
 pub struct Noise {
     /// Of a pixel coordinate [px].
     pub pixels: f64,
+    /// Of a coordinate of a depth camera's point [m].
+    pub points: f64,
     /// Of a joint reading [rad or m].
     pub joints: f64,
     /// Of a recorded tip pose.
@@ -164,10 +168,18 @@ impl PoseNoise {
     }
 }
 
+impl Camera {
+    /// True where nothing is said of a lens, and the camera gives points alone.
+    pub fn gives_points_alone(&self) -> bool {
+        self.depth && [self.fx, self.fy, self.cx, self.cy].iter().all(Option::is_none)
+    }
+}
+
 impl Default for Noise {
     fn default() -> Self {
         Noise {
             pixels: 0.5,
+            points: 0.005,
             joints: 0.0,
             pose: PoseNoise::default(),
             target: None,
@@ -199,6 +211,8 @@ pub struct Fit {
     pub rms_px: f64,
     /// Mean pixel distance [px].
     pub mean_px: f64,
+    /// Root mean square of the distances of a depth camera's points [m]; `None` without such points.
+    pub rms_points_m: Option<f64>,
     /// What the data cannot determine, in words, and how it was fixed.
     pub gauge: Vec<String>,
     /// Smallest and largest value of every joint in the samples used [rad or m], in the order of the rig's joints; empty without any.

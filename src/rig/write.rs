@@ -148,6 +148,9 @@ fn write_fit(table: &mut dyn TableLike, fit: &Fit) {
     }
     set(table, "rms_px", number(fit.rms_px));
     set(table, "mean_px", number(fit.mean_px));
+    if let Some(rms) = fit.rms_points_m {
+        set(table, "rms_points_m", number(rms));
+    }
     set_texts(table, "gauge", &fit.gauge);
     if !fit.joints.is_empty() {
         set(table, "joints", Value::Array(fit.joints.iter().map(|range| numbers(range)).collect()));

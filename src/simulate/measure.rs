@@ -1,6 +1,6 @@
 //! From what is true to what is read: noise, missed detections, gross outliers.
 use super::SimulateOptions;
-use crate::recording::{Detection, RecordedCamera, Recording, Sample};
+use crate::recording::{Detection, PointDetection, RecordedCamera, Recording, Sample};
 use crate::rig::{Noise, PoseNoise, Rig};
 use handeye_solvers::Pose;
 use handeye_solvers::manifold::so3;
@@ -12,6 +12,11 @@ use rand_distr::StandardNormal;
 /// Streams of random numbers beside that of the motions, which is 0.
 const NOISE: u64 = 1;
 const DETECTION: u64 = 2;
+const POINT_NOISE: u64 = 3;
+const POINT_DETECTION: u64 = 4;
+
+/// A wrong point is up to this share of its distance off, along each axis of the camera.
+const ASTRAY: f64 = 0.5;
 
 /// A recording with noise, and how many of its detections are missing or wrong.
 pub(super) struct Measured {
@@ -28,26 +33,26 @@ pub(super) fn measure(truth: &Recording, rig: &Rig, options: &SimulateOptions) -
         random
     };
     let (mut noise, mut detector) = (stream(NOISE), stream(DETECTION));
+    let (mut point_noise, mut point_detector) = (stream(POINT_NOISE), stream(POINT_DETECTION));
     let mut measured = Measured { recording: truth.clone(), missed: 0, outliers: 0 };
     let Measured { recording, missed, outliers } = &mut measured;
+    let mut count = |fate: Fate| {
+        *outliers += usize::from(fate == Fate::Outlier);
+        *missed += usize::from(fate == Fate::Missed);
+        fate != Fate::Missed
+    };
     for sample in &mut recording.samples {
         blur(sample, &rig.noise, &mut noise);
-        sample.pixels.retain_mut(|detection| match detect(detection, &truth.cameras, options, &mut detector) {
-            Fate::Seen => true,
-            Fate::Outlier => {
-                *outliers += 1;
-                true
-            }
-            Fate::Missed => {
-                *missed += 1;
-                false
-            }
-        });
+        for seen in &mut sample.points {
+            seen.point = seen.point.map(|x| x + rig.noise.points * point_noise.sample::<f64, _>(StandardNormal));
+        }
+        sample.pixels.retain_mut(|detection| count(detect(detection, &truth.cameras, options, &mut detector)));
+        sample.points.retain_mut(|detection| count(detect_point(detection, options, &mut point_detector)));
     }
     measured
 }
 
-/// Gaussian noise on everything that a sample holds.
+/// Gaussian noise on everything that a sample holds but points.
 fn blur(sample: &mut Sample, noise: &Noise, random: &mut ChaCha8Rng) {
     let mut normal = |sd: f64| -> f64 { sd * random.sample::<f64, _>(StandardNormal) };
     sample.joints.iter_mut().flatten().for_each(|joint| *joint += normal(noise.joints));
@@ -68,6 +73,7 @@ pub(super) fn moved(pose: Pose, noise: PoseNoise, mut normal: impl FnMut() -> f6
     Pose { rotation: so3::exp(&w) * pose.rotation, translation: pose.translation + v }
 }
 
+#[derive(Clone, Copy, PartialEq)]
 enum Fate {
     Seen,
     Missed,
@@ -89,6 +95,20 @@ fn detect(
     if errs < options.outliers {
         let [width, height] = cameras[detection.camera as usize].size.unwrap_or_default().map(f64::from);
         detection.pixel = [u * width - 0.5, v * height - 0.5];
+        return Fate::Outlier;
+    }
+    Fate::Seen
+}
+
+/// Whether a point is missed, or replaced by another place before the camera.
+fn detect_point(detection: &mut PointDetection, options: &SimulateOptions, random: &mut ChaCha8Rng) -> Fate {
+    let [misses, errs, shift @ ..]: [f64; 5] = std::array::from_fn(|_| random.random::<f64>());
+    if misses < options.missed {
+        return Fate::Missed;
+    }
+    if errs < options.outliers {
+        let reach = ASTRAY * Vector3::from(detection.point).norm();
+        detection.point.iter_mut().zip(shift).for_each(|(x, share)| *x += reach * (2.0 * share - 1.0));
         return Fate::Outlier;
     }
     Fate::Seen

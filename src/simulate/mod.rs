@@ -22,7 +22,8 @@ pub struct SimulateOptions {
     pub seed: u64,
     /// Probability that a detection is missing, in [0, 1].
     pub missed: f64,
-    /// Probability that a detection is anywhere in the image instead of where the feature is, in [0, 1].
+    /// Probability that a detection is anywhere in the image instead of where the feature is, in [0, 1]; that a point is up to half
+    /// its distance off along each axis.
     pub outliers: f64,
     /// Share of the features that every camera has in view in every sample, in [0, 1].
     pub in_view: f64,
@@ -53,7 +54,7 @@ impl SimulateOptions {
 pub struct Simulation {
     /// What was commanded, read and seen, with noise, missed detections and outliers.
     pub recording: Recording,
-    /// The true joints, tip poses and pixels of the same samples; of every feature in view, missed or not.
+    /// The true joints, tip poses, pixels and points of the same samples; of every feature in view, missed or not.
     pub truth: Recording,
     /// How many detections of features in view are missing.
     pub missed: usize,
@@ -63,7 +64,7 @@ pub struct Simulation {
 
 /// Records random joint positions of a complete rig, uniform within the limits where its features are in view.
 ///
-/// A revolute joint without limits takes any angle in ±π. Joints are always recorded; tip poses, joint actions and pose
+/// Cameras see pixels, and depth cameras the points of the same features. A revolute joint without limits takes any angle in ±π. Joints are always recorded; tip poses, joint actions and pose
 /// actions where the rig has noise for them. Noise, missed detections and outliers have random numbers of their own, so the
 /// motions depend on the rig and the seed alone, and more samples begin with the fewer.
 ///
@@ -102,12 +103,9 @@ fn record(rig: &Rig, model: &Model, views: &Views<'_>, positions: Vec<Vec<f64>>)
     let sample = |index: usize| {
         let joints = &positions[index];
         let next = positions.get(index + 1);
-        let mut pixels = views.detections(joints);
-        for detection in &mut pixels {
-            detection.feature = places[detection.feature as usize];
-        }
-        pixels.sort_unstable_by_key(|detection| (detection.camera, detection.feature));
-        Sample {
+        let pixels = views.detections(joints);
+        let points = views.points(joints, &pixels);
+        let mut sample = Sample {
             time: Some(index as f64),
             joints: Some(joints.clone()),
             pose: Some(poses[index]),
@@ -116,8 +114,14 @@ fn record(rig: &Rig, model: &Model, views: &Views<'_>, positions: Vec<Vec<f64>>)
                 .map(|next| next.iter().zip(joints).map(|(next, now)| next - now).collect()),
             pose_action: poses.get(index + 1).filter(|_| acts_on_pose).map(|next| *next * poses[index].inverse()),
             pixels,
+            points,
             ..Sample::default()
-        }
+        };
+        sample.pixels.iter_mut().for_each(|seen| seen.feature = places[seen.feature as usize]);
+        sample.points.iter_mut().for_each(|seen| seen.feature = places[seen.feature as usize]);
+        sample.pixels.sort_unstable_by_key(|seen| (seen.camera, seen.feature));
+        sample.points.sort_unstable_by_key(|seen| (seen.camera, seen.feature));
+        sample
     };
     Recording {
         joints: rig.robot.joints.iter().map(|joint| joint.name.clone()).collect(),

@@ -99,6 +99,7 @@ fn place_cameras(rig: &mut Rig, cameras: usize, positions: &[Vec<f64>], attempt:
             cx: Some(random.random_range(310.0..330.0)),
             cy: Some(random.random_range(230.0..250.0)),
             distortion: None,
+            depth: false,
             parent: Parent::World,
             pose: Some(looking_from(centre + direction * distance, -direction)),
         });

@@ -73,6 +73,7 @@ fn random_rig(seed: u64) -> Rig {
             cx: maybe(random, random_number),
             cy: maybe(random, random_number),
             distortion: maybe(random, |r| (0..r.random_range(0..=n_coefficients)).map(|_| random_number(r)).collect()),
+            depth: random.random_bool(0.3),
             parent: parent(random),
             pose: maybe(random, random_pose),
         });
@@ -94,6 +95,7 @@ fn random_rig(seed: u64) -> Rig {
     if random.random_bool(0.7) {
         rig.noise = Noise {
             pixels: random.random_range(0.0..2.0),
+            points: random.random_range(0.0..0.1),
             joints: random.random_range(0.0..1e-6),
             pose: PoseNoise { xyz: random.random_range(0.0..0.1), rot: 0.0 },
             target: maybe(random, |r| PoseNoise { xyz: r.random_range(1e-6..0.1), rot: r.random_range(1e-6..0.1) }),
@@ -117,6 +119,7 @@ fn random_rig(seed: u64) -> Rig {
         rejected: r.random_range(0..10),
         rms_px: r.random_range(0.0..1.0),
         mean_px: r.random_range(0.0..1.0),
+        rms_points_m: maybe(r, |r| r.random_range(0.0..0.1)),
         gauge: (0..r.random_range(0..3)).map(|i| format!("the world's frame, {i}")).collect(),
         joints: joints.iter().map(|_| [r.random_range(-3.0..0.0), r.random_range(0.0..3.0)]).collect(),
         sd: [("robot.base".to_owned(), (0..6).map(|_| r.random_range(0.0..1.0)).collect())].into(),

@@ -37,6 +37,7 @@ fn noise_has_the_standard_deviations_of_the_rig() {
     let mut rig = ur5();
     rig.noise = Noise {
         pixels: 0.7,
+        points: 0.004,
         joints: 0.002,
         pose: PoseNoise { xyz: 0.003, rot: 0.004 },
         target: None,

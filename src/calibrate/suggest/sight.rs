@@ -2,6 +2,7 @@
 use super::super::deviations::Honest;
 use super::super::graph::State;
 use super::super::numbers::{Numbers, Part};
+use super::super::observation::Kind;
 use super::super::outliers::Verdict;
 use crate::chain::{ChainJacobian, JointKind};
 use crate::factors::{Intrinsics, Reprojection};
@@ -21,7 +22,7 @@ pub(super) struct Sight<'a> {
     numbers: &'a Numbers,
     views: &'a Views<'a>,
     /// Standard deviation of a pixel coordinate of each camera, larger where some detections are missed [px]; `None` where the
-    /// camera moved and says nothing.
+    /// camera moved, or gave points alone, and says nothing.
     sigmas: Vec<Option<f64>>,
     /// Standard deviation of each joint's reading [rad or m].
     joints: Vec<f64>,
@@ -44,7 +45,7 @@ impl<'a> Sight<'a> {
         let kinds = state.model.chain.kinds.iter();
         let joints = kinds.map(|kind| if are_read { noise } else { unread(kind) }).collect();
         let shares = shares_detected(honest, state, verdict, views);
-        let sigmas = shares.into_iter().map(|share| Some(setup.sigma() / (thinned * share?).sqrt())).collect();
+        let sigmas = shares.into_iter().map(|share| Some(setup.sd(Kind::Pixels) / (thinned * share?).sqrt())).collect();
         Sight { state, numbers, views, sigmas, joints }
     }
 
@@ -136,7 +137,7 @@ struct Link {
     by: ChainJacobian,
 }
 
-/// Share of what is in view that each camera detected in the recording; `None` of cameras that moved.
+/// Share of what is in view that each camera detected in the recording; `None` of cameras that moved or gave no pixels.
 fn shares_detected(honest: &Honest<'_>, state: &State, verdict: &Verdict, views: &Views<'_>) -> Vec<Option<f64>> {
     let mut in_view = vec![0_usize; verdict.moved.len()];
     for joints in state.joints.iter().zip(&state.placed).filter(|(_, placed)| **placed).map(|(joints, _)| joints) {
@@ -144,8 +145,8 @@ fn shares_detected(honest: &Honest<'_>, state: &State, verdict: &Verdict, views:
     }
     let mut detected = vec![0_usize; in_view.len()];
     let used = honest.setup.observations.iter().zip(&verdict.active).filter(|(_, active)| **active);
-    used.for_each(|(seen, _)| detected[seen.camera] += 1);
+    used.filter(|(seen, _)| seen.kind() == Kind::Pixels).for_each(|(seen, _)| detected[seen.camera] += 1);
     let share = |(detected, in_view): (usize, usize)| (detected.max(1) as f64 / in_view.max(1) as f64).min(1.0);
-    let shares = detected.into_iter().zip(in_view).map(share).zip(&verdict.moved);
-    shares.map(|(share, moved)| (!moved).then_some(share)).collect()
+    let shares = detected.into_iter().zip(in_view).map(share).zip(&verdict.moved).zip(&honest.setup.intrinsics);
+    shares.map(|((share, moved), known)| (!moved && !known.unused).then_some(share)).collect()
 }

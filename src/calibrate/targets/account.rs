@@ -4,7 +4,7 @@ use super::setup::Setup;
 use super::start::Start;
 use super::{residual, turning};
 use crate::Error;
-use crate::calibrate::{Calibration, Report, StageReport};
+use crate::calibrate::{Calibration, PointErrors, Report, StageReport};
 use crate::chain::LINK_PARAMETERS;
 use crate::recording::Recording;
 use crate::rig::{Fit, Rig};
@@ -109,6 +109,7 @@ impl Account<'_> {
             rms_px: 0.0,
             mean_px: 0.0,
             median_px: 0.0,
+            points: PointErrors::default(),
             cameras: Vec::new(),
             stages: vec![stage],
             converged,

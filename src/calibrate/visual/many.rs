@@ -1,28 +1,57 @@
-//! Two or more cameras: essential matrices between cameras, triangulation, and alignment from sample to sample.
+//! A depth camera, or two or more others: essential matrices between cameras, triangulation, and alignment from sample to sample.
 use super::{Scene, Sighting, Views};
-use crate::geometry::{align, relative_pose, resect_robust, triangulate};
+use crate::geometry::{align_robust, relative_pose, resect_robust, triangulate};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 
 /// Correspondences that two cameras must share: five determine their pose, the others say whether it is right.
 const SHARED: usize = 8;
 
-/// A triangulated feature of one sample, in the mount's frame.
+/// Points that a depth camera must share with the others: three determine its pose, the fourth says whether it is right.
+const SHARED_POINTS: usize = 4;
+
+/// Located features of one sample, in the mount's frame.
 type Points = BTreeMap<usize, Vector3<f64>>;
 
-/// `None` where no two cameras share enough.
-pub(super) fn reconstruct(views: &Views<'_>) -> Option<Scene> {
+/// From depth cameras, and from two others where that leaves anything open; empty where no depth camera sees enough and no two
+/// cameras share enough.
+pub(super) fn reconstruct(views: &Views<'_>) -> Vec<Scene> {
+    match from_depth(views) {
+        Some(scene) if scene.is_whole() => vec![scene],
+        scene => scene.into_iter().chain(from_pair(views)).collect(),
+    }
+}
+
+/// From the depth camera with most points, in metres.
+fn from_depth(views: &Views<'_>) -> Option<Scene> {
+    let mut counts = vec![0; views.cameras];
+    let sightings = views.samples.iter().flatten();
+    sightings.filter(|sighting| sighting.point.is_some()).for_each(|sighting| counts[sighting.camera] += 1);
+    let first = (0..views.cameras).rev().max_by_key(|&camera| counts[camera]).filter(|&camera| counts[camera] > 0)?;
+    let mut scene = Scene::empty(views);
+    scene.cameras[first] = Some(Pose::identity());
+    complete(views, scene, &|sighting| sighting.point)
+}
+
+/// From two cameras, in units of their distance.
+fn from_pair(views: &Views<'_>) -> Option<Scene> {
     let mut scene = Scene::empty(views);
     let (first, second, pose) = best_pair(views)?;
     scene.cameras[first] = Some(Pose::identity());
     scene.cameras[second] = Some(pose.inverse());
-    let mut points = triangulate_all(views, &scene);
-    while let Some((camera, pose)) = next_camera(views, &scene, &points) {
+    complete(views, scene, &|_| None)
+}
+
+/// The point of a sighting, where it is in the unit of the scene.
+type Measured<'a> = &'a dyn Fn(&Sighting) -> Option<Vector3<f64>>;
+
+/// Adds cameras as long as one can be placed, then places the object in every sample.
+fn complete(views: &Views<'_>, mut scene: Scene, measured: Measured<'_>) -> Option<Scene> {
+    let mut points = locate_all(views, &scene, measured);
+    while let Some((camera, pose)) = next_camera(views, &scene, &points, measured) {
         scene.cameras[camera] = Some(pose);
-        points = triangulate_all(views, &scene);
+        points = locate_all(views, &scene, measured);
     }
     place_objects(views, &mut scene, &points)?;
     Some(scene)
@@ -59,44 +88,59 @@ fn correspondences(views: &Views<'_>, first: usize, second: usize) -> (Vec<Vecto
     pairs
 }
 
-/// The camera without a pose that sees most triangulated points, and its pose.
-fn next_camera(views: &Views<'_>, scene: &Scene, points: &[Points]) -> Option<(usize, Pose)> {
+/// The camera without a pose that sees most located features, and its pose.
+fn next_camera(views: &Views<'_>, scene: &Scene, points: &[Points], measured: Measured<'_>) -> Option<(usize, Pose)> {
     let mut best: Option<(usize, usize, Pose)> = None;
     for camera in (0..views.cameras).filter(|&camera| scene.cameras[camera].is_none()) {
         let (mut known, mut bearings) = (Vec::new(), Vec::new());
+        let (mut in_mount, mut in_camera) = (Vec::new(), Vec::new());
         for (sample, points) in views.samples.iter().zip(points) {
             for sighting in sample.iter().filter(|sighting| sighting.camera == camera) {
-                if let Some(point) = points.get(&sighting.feature) {
-                    known.push(*point);
-                    bearings.push(sighting.bearing);
+                let Some(point) = points.get(&sighting.feature) else { continue };
+                known.push(*point);
+                bearings.push(sighting.bearing);
+                if let Some(measured) = measured(sighting) {
+                    in_mount.push(*point);
+                    in_camera.push(measured);
                 }
             }
         }
         if best.as_ref().is_some_and(|best| known.len() <= best.0) {
             continue;
         }
-        if let Some(found) = resect_robust(&known, &bearings, 2.0 * views.threshold, views.seed)
-            && found.inliers.len() >= 6
-            && 3 * found.inliers.len() >= known.len()
-        {
-            best = Some((known.len(), camera, found.camera_from_points.inverse()));
+        let aligned = (in_camera.len() >= SHARED_POINTS).then(|| align_robust(&in_camera, &in_mount, views.seed));
+        let resected = || {
+            let found = resect_robust(&known, &bearings, 2.0 * views.threshold, views.seed)?;
+            let is_good = found.inliers.len() >= 6 && 3 * found.inliers.len() >= known.len();
+            is_good.then(|| found.camera_from_points.inverse())
+        };
+        if let Some(pose) = aligned.flatten().or_else(resected) {
+            best = Some((known.len(), camera, pose));
         }
     }
     best.map(|(_, camera, pose)| (camera, pose))
 }
 
-/// Every feature that two or more placed cameras see in one sample, where their rays meet.
-fn triangulate_all(views: &Views<'_>, scene: &Scene) -> Vec<Points> {
+/// Every feature of each sample that placed depth cameras measured (their mean), or that two or more placed cameras see,
+/// where their rays meet.
+fn locate_all(views: &Views<'_>, scene: &Scene, measured: Measured<'_>) -> Vec<Points> {
     let in_sample = |sample: &Vec<Sighting>| {
         let mut rays: BTreeMap<usize, (Vec<Pose>, Vec<Vector3<f64>>)> = BTreeMap::new();
+        let mut direct: BTreeMap<usize, (Vector3<f64>, f64)> = BTreeMap::new();
         for sighting in sample {
-            if let Some(pose) = scene.cameras[sighting.camera] {
-                let rays = rays.entry(sighting.feature).or_default();
-                rays.0.push(pose.inverse());
-                rays.1.push(sighting.bearing);
+            let Some(pose) = scene.cameras[sighting.camera] else { continue };
+            if let Some(point) = measured(sighting) {
+                let entry = direct.entry(sighting.feature).or_insert((Vector3::zeros(), 0.0));
+                *entry = (entry.0 + pose.transform(&point), entry.1 + 1.0);
             }
+            let rays = rays.entry(sighting.feature).or_default();
+            rays.0.push(pose.inverse());
+            rays.1.push(sighting.bearing);
         }
         let meet = |(feature, (cameras, bearings)): (usize, (Vec<Pose>, Vec<Vector3<f64>>))| {
+            if let Some((sum, count)) = direct.get(&feature) {
+                return Some((feature, sum / *count));
+            }
             if cameras.len() < 2 {
                 return None;
             }
@@ -159,31 +203,4 @@ fn place(points: &Points, structure: &mut Structure, seed: u64) -> Option<Pose> 
         entry.1 += 1.0;
     }
     Some(pose)
-}
-
-/// Alignment that up to a third of wrong points does not spoil: the triple with the least median distance, then all points
-/// within three times that.
-fn align_robust(from: &[Vector3<f64>], to: &[Vector3<f64>], seed: u64) -> Option<Pose> {
-    let distances = |pose: &Pose| -> Vec<f64> {
-        from.iter().zip(to).map(|(from, to)| (pose.transform(from) - to).norm()).collect()
-    };
-    let middle = |pose: &Pose| crate::calibrate::evaluate::median(&mut distances(pose));
-    let mut best = align(from, to)?;
-    if from.len() > 3 {
-        let mut random = ChaCha8Rng::seed_from_u64(seed);
-        for _ in 0..30 {
-            let three: [usize; 3] = std::array::from_fn(|_| random.random_range(0..from.len()));
-            if let Some(pose) = align(&three.map(|i| from[i]), &three.map(|i| to[i]))
-                && middle(&pose) < 0.5 * middle(&best)
-            {
-                best = pose;
-            }
-        }
-        let limit = 3.0 * middle(&best);
-        let near: Vec<usize> =
-            distances(&best).into_iter().enumerate().filter(|(_, d)| *d <= limit).map(|(i, _)| i).collect();
-        let pick = |points: &[Vector3<f64>]| near.iter().map(|&i| points[i]).collect::<Vec<_>>();
-        best = align(&pick(from), &pick(to)).unwrap_or(best);
-    }
-    Some(best)
 }

@@ -8,13 +8,15 @@ mod one;
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
 
-/// One detection as a direction.
+/// What one camera saw of a feature.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sighting {
     pub camera: usize,
     pub feature: usize,
     /// Unit bearing in the camera's frame.
     pub bearing: Vector3<f64>,
+    /// Where a depth camera has it, in its frame [m].
+    pub point: Option<Vector3<f64>>,
 }
 
 /// What is reconstructed, up to a similarity.
@@ -37,15 +39,19 @@ pub(crate) struct Views<'a> {
     pub seed: u64,
 }
 
-/// Scenes that explain the views, the most promising first; empty where no two cameras and no two samples share enough.
+/// Scenes that explain the views, the most promising first; empty where no depth camera sees enough, and no two cameras and no
+/// two samples share enough.
 pub(crate) fn reconstruct(views: &Views<'_>) -> Vec<Scene> {
-    match many::reconstruct(views) {
-        Some(scene) => vec![scene],
-        None => one::reconstruct(views),
-    }
+    let scenes = many::reconstruct(views);
+    if scenes.is_empty() { one::reconstruct(views) } else { scenes }
 }
 
 impl Scene {
+    /// True where every camera and every sample is placed.
+    fn is_whole(&self) -> bool {
+        self.cameras.iter().all(Option::is_some) && self.objects.iter().all(Option::is_some)
+    }
+
     fn empty(views: &Views<'_>) -> Scene {
         Scene {
             cameras: vec![None; views.cameras],

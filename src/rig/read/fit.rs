@@ -5,7 +5,7 @@ use crate::Error;
 use crate::rig::{Fit, Rig};
 
 pub(super) fn read_fit(node: &Node, rig: &Rig) -> Result<Fit, Error> {
-    let known = ["samples", "observations", "rejected", "rms_px", "mean_px", "gauge", "joints", "sd"];
+    let known = ["samples", "observations", "rejected", "rms_px", "mean_px", "rms_points_m", "gauge", "joints", "sd"];
     let fields = node.clone().table(&known)?.labelled("fit");
     let count = |node: &Node| node.whole::<u32>().map(|n| n as usize);
     let sd = fields.optional("sd", |node| {
@@ -20,6 +20,7 @@ pub(super) fn read_fit(node: &Node, rig: &Rig) -> Result<Fit, Error> {
         rejected: fields.optional("rejected", count)?.unwrap_or_default(),
         rms_px: fields.optional("rms_px", Node::not_negative)?.unwrap_or_default(),
         mean_px: fields.optional("mean_px", Node::not_negative)?.unwrap_or_default(),
+        rms_points_m: fields.optional("rms_points_m", Node::not_negative)?,
         gauge: fields.optional("gauge", read_gauge)?.unwrap_or_default(),
         joints: fields.optional("joints", |node| read_ranges(node, rig))?.unwrap_or_default(),
         sd: sd.unwrap_or_default(),

@@ -3,12 +3,14 @@ use super::document::Node;
 use crate::Error;
 use crate::rig::{Noise, PoseNoise};
 
+const KEYS: [&str; 7] = ["pixels", "points", "joints", "pose", "target", "joint_action", "pose_action"];
+
 pub(super) fn read_noise(node: &Node) -> Result<Noise, Error> {
-    let fields =
-        node.clone().table(&["pixels", "joints", "pose", "target", "joint_action", "pose_action"])?.labelled("noise");
+    let fields = node.clone().table(&KEYS)?.labelled("noise");
     let default = Noise::default();
     Ok(Noise {
         pixels: fields.optional("pixels", Node::not_negative)?.unwrap_or(default.pixels),
+        points: fields.optional("points", Node::not_negative)?.unwrap_or(default.points),
         joints: fields.optional("joints", Node::not_negative)?.unwrap_or(default.joints),
         pose: fields.optional("pose", read_pose_noise)?.unwrap_or(default.pose),
         target: fields.optional("target", read_target_noise)?,

@@ -8,7 +8,8 @@ use crate::error::suggestion;
 use crate::rig::names::problem_of_name;
 use crate::rig::{Camera, Feature, Joint, Parent, Target};
 
-const CAMERA_KEYS: &[&str] = &["name", "size", "model", "fx", "fy", "cx", "cy", "distortion", "parent", "pose"];
+const CAMERA_KEYS: &[&str] =
+    &["name", "size", "model", "fx", "fy", "cx", "cy", "distortion", "depth", "parent", "pose"];
 const FEATURE_KEYS: &[&str] = &["name", "parent", "xyz"];
 const TARGET_KEYS: &[&str] = &["name", "parent", "pose"];
 
@@ -28,6 +29,7 @@ fn read_camera(name: String, fields: &Fields, joints: &[Joint]) -> Result<Camera
         cx: fields.number("cx")?,
         cy: fields.number("cy")?,
         distortion: fields.optional("distortion", |node| read_distortion(node, model))?,
+        depth: fields.optional("depth", Node::flag)?.unwrap_or(false),
         parent: fields.optional("parent", |node| read_parent(node, joints))?.unwrap_or(Parent::World),
         pose: fields.optional("pose", read_pose)?,
     })

@@ -57,6 +57,8 @@ pub(super) fn write_camera(
     writer.put("cx", &before.cx, &now.cx, |v| number(*v));
     writer.put("cy", &before.cy, &now.cy, |v| number(*v));
     writer.put("distortion", &before.distortion, &now.distortion, |v| numbers(v));
+    let depth = |camera: &Camera| camera.depth.then_some(true);
+    writer.put("depth", &depth(before), &depth(now), |v| Value::from(*v));
     write_parent(&mut writer, parent(before.parent, joints_before), parent(now.parent, joints));
     writer.put_pose("pose", &before.pose, &now.pose);
 }
@@ -104,6 +106,7 @@ pub(super) fn write_noise(table: &mut dyn TableLike, before: Option<&Noise>, now
     let mut writer = Writer { table, fresh: before.is_none() };
     let before = before.copied().unwrap_or_default();
     writer.put_default("pixels", before.pixels, now.pixels, |v| number(*v));
+    writer.put_default("points", before.points, now.points, |v| number(*v));
     writer.put_default("joints", before.joints, now.joints, |v| number(*v));
     write_pose_noise(&mut writer, "pose", before.pose, now.pose);
     match (before.target, now.target) {
