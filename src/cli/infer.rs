@@ -4,16 +4,16 @@ use super::inputs::{read_recordings, read_rig};
 use super::words::count;
 use clap::Args;
 use handeye::Error;
-use handeye::infer::{Branch, InferOptions, Inference, Names, Prior};
+use handeye::infer::{Branch, InferOptions, Inference, Names, Prior, Sightings};
 use handeye::recording::{Recording, Sample};
 use handeye::rig::Rig;
 use handeye::solvers::{Pose, manifold::so3};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 
-/// Infer the joints and the tip's pose from each sample's pixels alone
+/// Infer the joints and the tip's pose from each sample's pixels and points alone
 ///
-/// Prints JSON Lines, one object a sample: `joints`, `pose` and `rms_px` of the most probable branch, its `sd` (one number per joint)
+/// Prints JSON Lines, one object a sample: `joints`, `pose` and `rms_px` (and `rms_points_mm`) of the most probable branch, its `sd` (one number per joint)
 /// and `probability`; the other `branches` where there are any; and the `open` directions of the joints that the pixels do not
 /// determine, where they stay in the middle of their limits. A sample of which nothing can be told has `error` instead.
 #[derive(Args)]
@@ -78,13 +78,14 @@ impl Infer {
         let mut before: Option<(Vec<Branch>, &[f64])> = None;
         let mut objects = Vec::with_capacity(recording.samples.len());
         for (index, sample) in recording.samples.iter().enumerate() {
-            let seen = names.sightings(sample);
+            let (pixels, points) = (names.sightings(sample), names.points(sample));
+            let seen = Sightings { pixels: &pixels, points: &points };
             let found = match (&before, &sample.joints) {
-                (Some((branches, action)), _) => inference.joints_after(branches, action, &seen),
+                (Some((branches, action)), _) => inference.joints_after(branches, action, seen),
                 (None, Some(joints)) if self.readings => {
-                    inference.joints(&seen, &Prior::readings(joints, rig.noise.joints))
+                    inference.joints(seen, &Prior::readings(joints, rig.noise.joints))
                 }
-                _ => inference.joints(&seen, &Prior::none()),
+                _ => inference.joints(seen, &Prior::none()),
             };
             let mut object = Map::new();
             object.insert("sample".to_owned(), json!(index));
@@ -92,7 +93,7 @@ impl Infer {
                 object.insert("time".to_owned(), json!(time));
             }
             match &found {
-                Ok(branches) => tell(&mut object, branches, seen.len()),
+                Ok(branches) => tell(&mut object, branches, seen),
                 Err(Error::NotEnoughData(reason)) => {
                     object.insert("error".to_owned(), json!(reason));
                 }
@@ -112,19 +113,23 @@ impl Infer {
 }
 
 /// The most probable branch, and the others.
-fn tell(object: &mut Map<String, Value>, branches: &[Branch], seen: usize) {
+fn tell(object: &mut Map<String, Value>, branches: &[Branch], seen: Sightings<'_>) {
     let Some((best, others)) = branches.split_first() else { return };
-    object.insert("detections".to_owned(), json!(seen));
-    object.extend(entry(best));
+    let has_points = !seen.points.is_empty();
+    object.insert("detections".to_owned(), json!(seen.pixels.len() + seen.points.len()));
+    object.extend(entry(best, has_points));
     if !best.open.is_empty() {
         object.insert("open".to_owned(), json!(best.open));
     }
     if !others.is_empty() {
-        object.insert("branches".to_owned(), others.iter().map(|branch| Value::Object(entry(branch))).collect());
+        object.insert(
+            "branches".to_owned(),
+            others.iter().map(|branch| Value::Object(entry(branch, has_points))).collect(),
+        );
     }
 }
 
-fn entry(branch: &Branch) -> Map<String, Value> {
+fn entry(branch: &Branch, has_points: bool) -> Map<String, Value> {
     let sd: Vec<f64> = branch.covariance.diagonal().iter().map(|variance| variance.sqrt()).collect();
     let pairs = [
         ("joints", json!(branch.joints)),
@@ -133,7 +138,8 @@ fn entry(branch: &Branch) -> Map<String, Value> {
         ("sd", json!(sd)),
         ("probability", json!(branch.probability)),
     ];
-    pairs.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+    let points = has_points.then(|| ("rms_points_mm", json!(1e3 * branch.rms_points_m)));
+    pairs.into_iter().chain(points).map(|(key, value)| (key.to_owned(), value)).collect()
 }
 
 fn pose(pose: &Pose) -> Value {

@@ -127,7 +127,7 @@ impl Queries {
         });
         // Before the graphs: their kernels leave wide vector registers in use, which slows down what follows.
         let pose = time(|| {
-            black_box(inference.poses(black_box(sightings)));
+            black_box(inference.poses(black_box(&*sightings)));
         });
         let by_kinematics = time_of(kinematics_graph(model, joints, &tip));
         let by_camera_feature = time_of(image_graph(model, sightings, *sigma, None, &tip));
@@ -135,10 +135,10 @@ impl Queries {
         let joints_from_pose = time(|| {
             black_box(inverse.solve(black_box(&tip), start));
         });
-        inference.joints(sightings, &Prior::none())?;
+        inference.joints(&*sightings, &Prior::none())?;
         let joints_from_image = time(|| {
             // It has just succeeded.
-            let _ = black_box(inference.joints(black_box(sightings), &Prior::none()));
+            let _ = black_box(inference.joints(black_box(&*sightings), &Prior::none()));
         });
         Ok([
             kinematics,

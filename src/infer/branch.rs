@@ -1,6 +1,7 @@
 //! Branches: the minima that joints were found at, with covariance, open directions and probability.
 use super::information::Information;
 use super::pixel_error::PixelError;
+use super::sighting::Telling;
 use handeye_solvers::Pose;
 use nalgebra::DMatrix;
 
@@ -16,8 +17,10 @@ pub struct Branch {
     pub open: Vec<Vec<f64>>,
     /// `world_from_tip` with these joints.
     pub pose: Pose,
-    /// Root mean square of the pixel distances that are left [px]; 0 where nothing was seen.
+    /// Root mean square of the pixel distances that are left [px]; 0 without pixels.
     pub rms_px: f64,
+    /// Root mean square of the distances of depth cameras' points that are left [m]; 0 without points.
+    pub rms_points_m: f64,
     /// How probable it is among the branches that were found: exp(-cost) √det(covariance), as a Gaussian around each has it.
     pub probability: f64,
 }
@@ -30,10 +33,10 @@ pub(super) struct Minimum {
     /// Inverse covariance.
     precision: DMatrix<f64>,
     open: Vec<Vec<f64>>,
-    squares: f64,
-    /// Of the pixels alone.
-    pub pixels: f64,
-    /// The whole cost there, of pixels, readings and beliefs.
+    squares: [f64; 2],
+    /// Of pixels and points alone.
+    pub seen: f64,
+    /// The whole cost there, of what was seen, readings and beliefs.
     pub misfit: f64,
     /// -ln of what its probability is in proportion to, but for the volume.
     pub cost: f64,
@@ -59,7 +62,7 @@ impl Minimum {
             precision: error.square() + information.square(),
             open,
             squares: error.squares,
-            pixels: error.pixels,
+            seen: error.seen,
             misfit,
             cost: misfit,
             joints,
@@ -74,8 +77,9 @@ impl Minimum {
     }
 }
 
-/// Branches of minima, most probable first. `seen`: how many sightings there were.
-pub(super) fn branches(minima: Vec<Minimum>, seen: usize) -> Vec<Branch> {
+/// Branches of minima, most probable first.
+pub(super) fn branches(minima: Vec<Minimum>, seen: &Telling) -> Vec<Branch> {
+    let counts = [seen.pixels.len(), seen.points.len()];
     let least = minima.iter().map(|minimum| minimum.cost).fold(f64::INFINITY, f64::min);
     let branch = |minimum: Minimum| {
         let n = minimum.joints.len();
@@ -84,11 +88,13 @@ pub(super) fn branches(minima: Vec<Minimum>, seen: usize) -> Vec<Branch> {
         let unknown = || DMatrix::from_diagonal_element(n, n, f64::INFINITY);
         let covariance = factor.map_or_else(unknown, |factor| factor.inverse());
         let covariance = (&covariance + covariance.transpose()) * 0.5;
+        let rms = |kind: usize| (minimum.squares[kind] / counts[kind].max(1) as f64).sqrt();
         Branch {
+            rms_px: rms(0),
+            rms_points_m: rms(1),
             open: minimum.open,
             covariance,
             pose: minimum.pose,
-            rms_px: if seen > 0 { (minimum.squares / seen as f64).sqrt() } else { 0.0 },
             probability: (least - minimum.cost).exp() * volume,
             joints: minimum.joints,
         }

@@ -1,10 +1,10 @@
 //! Branches told apart by the actions taken: what was inferred before, moved by an action, against what is seen after.
-use super::Sighting;
 use super::branch::{APART, Branch, Minimum, branches};
 use super::information::Information;
 use super::joints::Inference;
 use super::pose::is_plausible;
 use super::prior::Prior;
+use super::{Sighting, Sightings};
 use crate::Error;
 use nalgebra::DMatrix;
 
@@ -45,13 +45,13 @@ impl Inference {
     /// [`Inference::joints`]. `action`: one number per joint [rad or m].
     ///
     /// Errors: [`Error::Unusable`] for an action or branches that are not of this rig.
-    pub fn joints_after(
+    pub fn joints_after<'a>(
         &mut self,
         before: &[Branch],
         action: &[f64],
-        sightings: &[Sighting],
+        sightings: impl Into<Sightings<'a>>,
     ) -> Result<Vec<Branch>, Error> {
-        let n = self.chain.len();
+        let (n, sightings) = (self.chain.len(), sightings.into());
         let fits = |branch: &Branch| branch.joints.len() == n && branch.covariance.shape() == (n, n);
         if action.len() != n || !action.iter().all(|number| number.is_finite()) || !before.iter().all(fits) {
             let found = action.len();
@@ -69,11 +69,11 @@ impl Inference {
             }
         }
         // Among them, what is less probable by far does not have to explain what is seen.
-        let explained = minima.iter().any(|minimum| is_plausible(minimum.misfit, (2 * seen.len()) as f64));
+        let explained = minima.iter().any(|minimum| is_plausible(minimum.misfit, seen.coordinates()));
         if !explained && !seen.is_empty() {
             return self.joints(sightings, &Prior::none());
         }
-        Ok(branches(minima, seen.len()))
+        Ok(branches(minima, &seen))
     }
 
     /// Mean and precision of a branch after an action, and -ln of its probability density there.

@@ -1,11 +1,11 @@
-//! Joints from pixels: every branch that explains them, with covariance and probability.
-use super::Sighting;
+//! Joints from pixels and points: every branch that explains them, with covariance and probability.
 use super::branch::{Branch, Minimum, branches};
 use super::inverse::{InverseKinematics, InverseOptions};
 use super::joint_box::JointBox;
 use super::pixel_error::PixelError;
 use super::pose::{InferredPose, is_plausible, poses};
 use super::prior::Prior;
+use super::sighting::{Sd, Sightings, Telling};
 use super::views::Views;
 use crate::Error;
 use crate::chain::JointChain;
@@ -28,10 +28,11 @@ impl Default for InferOptions {
     }
 }
 
-/// Infers poses and joints of a known rig from pixels; prepared once.
+/// Infers poses and joints of a known rig from pixels and points; prepared once.
 ///
 /// Joints are found by least squares over all cameras and features, starting from the inverse kinematics of the tip's pose, which is
-/// found from all cameras in one problem. Detections count by the rig's `noise.pixels`, wrong ones in proportion to their distance
+/// found from all cameras in one problem. Detections count by the rig's `noise.pixels`, points of depth cameras by its
+/// `noise.points`, wrong ones in proportion to their distance
 /// only (Huber).
 #[derive(Clone, Debug)]
 pub struct Inference {
@@ -39,7 +40,7 @@ pub struct Inference {
     pub(super) chain: JointChain,
     pub(super) views: Views,
     pub(super) limits: JointBox,
-    pub(super) sigma: f64,
+    pub(super) sd: Sd,
     pub(super) action_sd: f64,
     inverse: InverseKinematics,
     pub(super) error: PixelError,
@@ -62,7 +63,7 @@ impl Inference {
             views: Views::new(&model),
             limits: JointBox::new(rig),
             action_sd: rig.noise.joint_action,
-            sigma: pixel_sd(rig),
+            sd: Sd::of(rig),
             inverse: InverseKinematics::new(rig, inverse)?,
             error: PixelError::default(),
             trial: Vec::new(),
@@ -73,8 +74,8 @@ impl Inference {
     ///
     /// From features on the tip seen by cameras in the world, and features in the world seen by cameras on the tip. Points in a plane
     /// before one camera often have two poses.
-    pub fn poses(&self, sightings: &[Sighting]) -> Vec<InferredPose> {
-        poses(&self.views, &self.views.known(sightings), self.chain.len(), self.sigma)
+    pub fn poses<'a>(&self, sightings: impl Into<Sightings<'a>>) -> Vec<InferredPose> {
+        poses(&self.views, &self.views.known(sightings.into(), self.sd), self.chain.len())
     }
 
     /// The joints' branches that explain the sightings, most probable first: never empty.
@@ -84,62 +85,64 @@ impl Inference {
     ///
     /// Errors: [`Error::NotEnoughData`] where nothing that any joint moves was seen and there is no prior; [`Error::Unusable`] where
     /// the prior is not of this rig.
-    pub fn joints(&mut self, sightings: &[Sighting], prior: &Prior) -> Result<Vec<Branch>, Error> {
+    pub fn joints<'a>(&mut self, sightings: impl Into<Sightings<'a>>, prior: &Prior) -> Result<Vec<Branch>, Error> {
         prior.check(self.chain.len())?;
-        let seen = self.telling(sightings, prior)?;
+        let seen = self.telling(sightings.into(), prior)?;
         let information = prior.information(&self.limits);
         let mut minima: Vec<Minimum> = Vec::new();
         if prior.is_given() {
             self.add(&mut minima, &seen, &information, prior, prior.mean.clone());
         }
-        for pose in poses(&self.views, &seen, self.chain.len(), self.sigma) {
+        for pose in poses(&self.views, &seen, self.chain.len()) {
             let sd = pose.covariance.diagonal().map(f64::sqrt);
             let tolerance = (TOLERANCE * sd.fixed_rows::<3>(3).norm(), TOLERANCE * sd.fixed_rows::<3>(0).norm());
             for reached in self.inverse.likely_branches(&pose.pose, &information.mean, tolerance) {
                 self.add(&mut minima, &seen, &information, prior, reached.joints);
             }
         }
-        let freedom = (2 * seen.len()) as f64 - self.chain.len() as f64;
-        if !minima.iter().any(|minimum| is_plausible(minimum.pixels, freedom)) {
+        let freedom = seen.coordinates() - self.chain.len() as f64;
+        if !minima.iter().any(|minimum| is_plausible(minimum.seen, freedom)) {
             self.search(&mut minima, &seen, &information, prior);
         }
         if minima.is_empty() {
             return Err(Error::NotEnoughData("no joints inside the limits come near to what was seen".to_owned()));
         }
-        Ok(branches(minima, seen.len()))
+        Ok(branches(minima, &seen))
     }
 
     /// The joints near a start: one local search, for tracking. From a start that is near, some ten times faster than
     /// [`Inference::joints`].
     ///
     /// Errors: as [`Inference::joints`]; [`Error::Unusable`] where the prior has no mean.
-    pub fn joints_near(&mut self, sightings: &[Sighting], prior: &Prior) -> Result<Branch, Error> {
+    pub fn joints_near<'a>(&mut self, sightings: impl Into<Sightings<'a>>, prior: &Prior) -> Result<Branch, Error> {
         prior.check(self.chain.len())?;
         if !prior.is_given() {
             return Err(Error::Unusable("a local search needs joints to begin with".to_owned()));
         }
-        let seen = self.telling(sightings, prior)?;
+        let seen = self.telling(sightings.into(), prior)?;
         let information = prior.information(&self.limits);
         let minimum = self.refine(&seen, &information, prior, prior.mean.clone(), false);
         let minimum =
             minimum.ok_or_else(|| Error::NotEnoughData("the search from this start broke down".to_owned()))?;
-        branches(vec![minimum], seen.len())
+        branches(vec![minimum], &seen)
             .pop()
             .ok_or_else(|| Error::NotEnoughData("the search from this start broke down".to_owned()))
     }
 
     /// Those that some joint moves.
-    pub(super) fn moved(&self, sightings: &[Sighting]) -> Vec<Sighting> {
-        let mut seen = self.views.known(sightings);
-        seen.retain(|sighting| {
-            let (from, to) = self.views.between(sighting);
+    pub(super) fn moved(&self, sightings: Sightings<'_>) -> Telling {
+        let mut seen = self.views.known(sightings, self.sd);
+        let moves = |camera: usize, feature: usize| {
+            let (from, to) = self.views.between(camera, feature);
             from < to
-        });
+        };
+        seen.pixels.retain(|sighting| moves(sighting.camera, sighting.feature));
+        seen.points.retain(|sighting| moves(sighting.camera, sighting.feature));
         seen
     }
 
     /// The same; fails where there is none, and nothing else is known.
-    fn telling(&self, sightings: &[Sighting], prior: &Prior) -> Result<Vec<Sighting>, Error> {
+    fn telling(&self, sightings: Sightings<'_>, prior: &Prior) -> Result<Telling, Error> {
         let seen = self.moved(sightings);
         if seen.is_empty() && !prior.is_given() {
             return Err(Error::NotEnoughData(
@@ -149,12 +152,4 @@ impl Inference {
         }
         Ok(seen)
     }
-}
-
-/// Stands in for a rig that says its pixels are exact [px].
-const EXACT: f64 = 1e-3;
-
-/// Standard deviation of a pixel coordinate [px].
-pub(super) fn pixel_sd(rig: &Rig) -> f64 {
-    if rig.noise.pixels > 0.0 { rig.noise.pixels } else { EXACT }
 }

@@ -1,4 +1,4 @@
-//! What a known rig is for: pixels to poses and joints, with covariance, and poses to joints.
+//! What a known rig is for: pixels and points to poses and joints, with covariance, and poses to joints.
 mod box_step;
 mod branch;
 mod closest;
@@ -25,5 +25,5 @@ pub use inverse::{InverseKinematics, InverseOptions, Reached};
 pub use joints::{InferOptions, Inference};
 pub use pose::InferredPose;
 pub use prior::Prior;
-pub use sighting::{Names, Sighting};
+pub use sighting::{Names, PointSighting, Sighting, Sightings};
 pub use tip::TipInference;

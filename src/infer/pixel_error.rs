@@ -1,8 +1,8 @@
-//! How far the pixels are from where joints put them, and the step of the joints that brings them nearer.
-use super::Sighting;
+//! How far pixels and points are from where joints put them, and the step of the joints that brings them nearer.
 use super::box_step::BoxStep;
 use super::information::Information;
 use super::joint_box::JointBox;
+use super::sighting::Telling;
 use super::views::Views;
 use crate::chain::{JointChain, Posture};
 use handeye_solvers::Pose;
@@ -16,33 +16,34 @@ pub(super) const HUBER: f64 = 3.0;
 ///
 ///   Σ ρ(|predicted - seen|² / σ²) + ½ (q - mean)ᵀ W (q - mean),   ρ Huber's loss
 ///
-/// by the joints. Only joints between a camera and a feature move the pixel, all as if the feature moved and the camera stood still.
+/// by the joints; points likewise, in metres. Only joints between a camera and a feature move the pixel, all as if the feature moved and the camera stood still.
 /// Kept between calls, so that none but the first allocates.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PixelError {
     posture: Posture,
     cameras: Vec<Pose>,
     screws: Vec<(Vector3<f64>, Vector3<f64>)>,
-    /// Of the pixels alone, by rows; the lower triangle is filled.
+    /// Of pixels and points alone, by rows; the lower triangle is filled.
     hessian: Vec<f64>,
     gradient: Vec<f64>,
     total: Vec<f64>,
     rows: [Vec<f64>; 2],
+    columns: Vec<Vector3<f64>>,
     lower: Vec<f64>,
     upper: Vec<f64>,
     program: BoxStep,
-    /// Sum of the squared pixel distances [px²].
-    pub squares: f64,
-    /// Cost of the pixels alone.
-    pub pixels: f64,
+    /// Sum of the squared pixel distances [px²], and of those of points [m²].
+    pub squares: [f64; 2],
+    /// Cost of pixels and points alone.
+    pub seen: f64,
 }
 
 impl PixelError {
-    /// The cost with these joints. `sigma`: standard deviation of a pixel coordinate [px].
+    /// The cost with these joints.
     pub fn look(
         &mut self,
         (chain, views): (&JointChain, &Views),
-        (sightings, sigma): (&[Sighting], f64),
+        telling: &Telling,
         information: &Information,
         joints: &[f64],
     ) -> f64 {
@@ -60,19 +61,20 @@ impl PixelError {
         self.hessian.resize(n * n, 0.0);
         self.gradient.clear();
         self.gradient.resize(n, 0.0);
-        (self.squares, self.pixels) = (0.0, 0.0);
+        (self.squares, self.seen) = ([0.0; 2], 0.0);
         for row in &mut self.rows {
             row.resize(n, 0.0);
         }
-        let inverse = 1.0 / sigma;
-        for sighting in sightings {
+        self.columns.resize(n, Vector3::zeros());
+        let inverse = 1.0 / telling.sd.pixels;
+        for sighting in &telling.pixels {
             let depth = views.features[sighting.feature].depth;
             let glance = views.glance(sighting, frame(depth), &self.cameras[sighting.camera]);
             let squared = glance.error[0] * glance.error[0] + glance.error[1] * glance.error[1];
-            self.squares += squared;
+            self.squares[0] += squared;
             let (loss, weight) = huber(squared * inverse * inverse);
-            self.pixels += loss;
-            let (from, to) = views.between(sighting);
+            self.seen += loss;
+            let (from, to) = views.between(sighting.camera, sighting.feature);
             let scale = weight * inverse * inverse;
             let sign = if depth == to { 1.0 } else { -1.0 };
             let [first, second] = &mut self.rows;
@@ -92,7 +94,28 @@ impl PixelError {
                 }
             }
         }
-        let mut cost = self.pixels;
+        let inverse = 1.0 / telling.sd.points;
+        for sighting in &telling.points {
+            let depth = views.features[sighting.feature].depth;
+            let (error, point) = views.glance_at_point(sighting, frame(depth), &self.cameras[sighting.camera]);
+            self.squares[1] += error.norm_squared();
+            let (loss, weight) = huber(error.norm_squared() * inverse * inverse);
+            self.seen += loss;
+            let (from, to) = views.between(sighting.camera, sighting.feature);
+            let scale = weight * inverse * inverse;
+            let sign = if depth == to { 1.0 } else { -1.0 };
+            for i in from..to {
+                let (w, m) = &self.screws[i];
+                self.columns[i] = (w.cross(&point) + m) * sign;
+            }
+            for i in from..to {
+                let column = self.columns[i] * scale;
+                self.gradient[i] -= column.dot(&error);
+                let row = self.hessian[i * n + from..=i * n + i].iter_mut();
+                row.zip(&self.columns[from..=i]).for_each(|(entry, other)| *entry += column.dot(other));
+            }
+        }
+        let mut cost = self.seen;
         self.total.clone_from(&self.hessian);
         for i in 0..n {
             let row = &information.matrix[i * n..(i + 1) * n];
@@ -119,7 +142,7 @@ impl PixelError {
         0.5 * self.gradient.iter().zip(&self.program.step).map(|(g, s)| g * s).sum::<f64>()
     }
 
-    /// Gauss-Newton matrix of the pixels alone, where [`PixelError::look`] was.
+    /// Gauss-Newton matrix of pixels and points alone, where [`PixelError::look`] was.
     pub fn square(&self) -> DMatrix<f64> {
         let n = self.gradient.len();
         DMatrix::from_fn(n, n, |i, j| self.hessian[i.max(j) * n + i.min(j)])

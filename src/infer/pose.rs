@@ -1,11 +1,11 @@
-//! The pose of the tip from the pixels of all cameras, in one problem.
-use super::Sighting;
+//! The pose of the tip from the pixels and points of all cameras, in one problem.
 use super::pixel_error::huber;
+use super::sighting::Telling;
 use super::views::Views;
-use crate::geometry::{pose_from_rays, poses_from_rays};
+use crate::geometry::{align, pose_from_rays, poses_from_rays};
 use handeye_solvers::Pose;
 use handeye_solvers::manifold::so3;
-use nalgebra::{Matrix6, Vector3, Vector6};
+use nalgebra::{Matrix3x6, Matrix6, Vector3, Vector6};
 
 /// A pose of the tip that explains what was seen.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,8 +15,10 @@ pub struct InferredPose {
     /// Covariance of its error: of the rotation vector [rad], then of the translation [m], both along the world's axes. What the
     /// rig itself is off by is not in it.
     pub covariance: Matrix6<f64>,
-    /// Root mean square of the pixel distances that are left [px].
+    /// Root mean square of the pixel distances that are left [px]; 0 without pixels.
     pub rms_px: f64,
+    /// Root mean square of the distances of points that are left [m]; 0 without points.
+    pub rms_points_m: f64,
     /// How probable it is among those that were found.
     pub probability: f64,
 }
@@ -39,20 +41,25 @@ const SAME: f64 = 1e-3;
 /// Least ratio of the extreme eigenvalues of the scaled normal equations at which the pose counts as determined.
 const DETERMINED: f64 = 1e-12;
 
-/// Poses of the tip, most probable first; empty where the sightings leave it open. `sigma`: of a pixel coordinate [px].
+/// Poses of the tip, most probable first; empty where the sightings leave it open.
 ///
 /// Sightings of features on the tip by cameras in the world count, and of features in the world by cameras on the tip.
 /// `n_joints`: joints that move the tip.
-pub(super) fn poses(views: &Views, sightings: &[Sighting], n_joints: usize, sigma: f64) -> Vec<InferredPose> {
-    let is_whole = |sighting: &&Sighting| views.between(sighting) == (0, n_joints);
-    let used: Vec<Sighting> = sightings.iter().filter(is_whole).copied().collect();
+pub(super) fn poses(views: &Views, seen: &Telling, n_joints: usize) -> Vec<InferredPose> {
+    let is_whole = |camera: usize, feature: usize| views.between(camera, feature) == (0, n_joints);
+    let mut used = seen.clone();
+    used.pixels.retain(|sighting| is_whole(sighting.camera, sighting.feature));
+    used.points.retain(|sighting| is_whole(sighting.camera, sighting.feature));
     let group = Group::larger(views, &used);
-    let problem = Problem { views, sightings: &used, sigma };
+    let problem = Problem { views, seen: &used };
     let mut found: Vec<(Pose, Normal)> = Vec::new();
+    found.extend(align(&group.of_points, &group.measured).and_then(|start| problem.refine(&group.tip(&start))));
     let several = group.origins.iter().any(|origin| (origin - group.origins[0]).norm_squared() > 0.0);
     if several
+        && found.first().is_none_or(|(_, normal)| !problem.is_plausible(normal))
         && let Some(start) = pose_from_rays(&group.points, &group.origins, &group.directions)
         && let Some(refined) = problem.refine(&group.tip(&start))
+        && found.iter().all(|(other, _)| other.angle_to(&refined.0) > SAME)
     {
         found.push(refined);
     }
@@ -69,9 +76,11 @@ pub(super) fn poses(views: &Views, sightings: &[Sighting], n_joints: usize, sigm
     found.retain(|(_, normal)| normal.cost < least + HOPELESS);
     let inferred = |(pose, normal): &(Pose, Normal)| {
         let covariance = normal.covariance()?;
-        let rms_px = (normal.squares / used.len() as f64).sqrt();
+        let rms = |squares: f64, count: usize| (squares / count.max(1) as f64).sqrt();
+        let (rms_px, rms_points_m) =
+            (rms(normal.squares[0], used.pixels.len()), rms(normal.squares[1], used.points.len()));
         let probability = (least - normal.cost).exp() * covariance.determinant().max(0.0).sqrt();
-        Some(InferredPose { pose: *pose, covariance, rms_px, probability })
+        Some(InferredPose { pose: *pose, covariance, rms_px, rms_points_m, probability })
     };
     let mut inferred: Vec<InferredPose> = found.iter().filter_map(inferred).collect();
     let sum: f64 = inferred.iter().map(|one| one.probability).sum();
@@ -81,28 +90,47 @@ pub(super) fn poses(views: &Views, sightings: &[Sighting], n_joints: usize, sigm
 }
 
 /// Sightings of one kind as points and rays: features on the tip and rays in the world, or features in the world and rays on the tip.
+#[derive(Default)]
 struct Group {
     on_tip: bool,
     points: Vec<Vector3<f64>>,
     origins: Vec<Vector3<f64>>,
     directions: Vec<Vector3<f64>>,
+    /// Features of which depth cameras gave points, and where these are in the frame of the rays.
+    of_points: Vec<Vector3<f64>>,
+    measured: Vec<Vector3<f64>>,
 }
 
 impl Group {
     /// The kind that has more of them.
-    fn larger(views: &Views, sightings: &[Sighting]) -> Group {
-        let is_on_tip = |sighting: &Sighting| views.features[sighting.feature].depth > 0;
-        let count = sightings.iter().filter(|sighting| is_on_tip(sighting)).count();
-        let on_tip = 2 * count >= sightings.len();
-        let mut group = Group { on_tip, points: Vec::new(), origins: Vec::new(), directions: Vec::new() };
-        for sighting in sightings.iter().filter(|sighting| is_on_tip(sighting) == on_tip) {
+    fn larger(views: &Views, seen: &Telling) -> Group {
+        let on_tip = |feature: usize| views.features[feature].depth > 0;
+        let pixels = seen.pixels.iter().map(|sighting| sighting.feature);
+        let features: Vec<usize> = pixels.chain(seen.points.iter().map(|sighting| sighting.feature)).collect();
+        let count = features.iter().filter(|feature| on_tip(**feature)).count();
+        let tips_are_more = 2 * count >= features.len();
+        let mut group = Group { on_tip: tips_are_more, ..Group::default() };
+        for sighting in seen.pixels.iter().filter(|sighting| on_tip(sighting.feature) == tips_are_more) {
             let camera = &views.cameras[sighting.camera];
             let Some(ray) = camera.model.unproject(&camera.intrinsics, sighting.pixel) else { continue };
-            group.points.push(views.features[sighting.feature].xyz);
-            group.origins.push(camera.pose.translation);
-            group.directions.push(camera.pose.rotation * ray);
+            group.add_ray(views.features[sighting.feature].xyz, &camera.pose, &ray);
+        }
+        for sighting in seen.points.iter().filter(|sighting| on_tip(sighting.feature) == tips_are_more) {
+            let (camera, feature) = (&views.cameras[sighting.camera], views.features[sighting.feature].xyz);
+            let point = Vector3::from(sighting.point);
+            group.of_points.push(feature);
+            group.measured.push(camera.pose.transform(&point));
+            if let Some(ray) = point.try_normalize(f64::MIN_POSITIVE) {
+                group.add_ray(feature, &camera.pose, &ray);
+            }
         }
         group
+    }
+
+    fn add_ray(&mut self, feature: Vector3<f64>, camera: &Pose, ray: &Vector3<f64>) {
+        self.points.push(feature);
+        self.origins.push(camera.translation);
+        self.directions.push(camera.rotation * ray);
     }
 
     /// `world_from_tip` of a pose `rays_from_points`.
@@ -113,8 +141,7 @@ impl Group {
 
 struct Problem<'a> {
     views: &'a Views,
-    sightings: &'a [Sighting],
-    sigma: f64,
+    seen: &'a Telling,
 }
 
 /// Normal equations in `Pose`'s own step, the rotation about the tip's origin.
@@ -122,15 +149,16 @@ struct Normal {
     hessian: Matrix6<f64>,
     gradient: Vector6<f64>,
     cost: f64,
-    squares: f64,
+    /// Sum of the squared distances of pixels [px²], and of points [m²].
+    squares: [f64; 2],
 }
 
 impl Problem<'_> {
     fn look(&self, tip: &Pose) -> Normal {
-        let mut normal = Normal { hessian: Matrix6::zeros(), gradient: Vector6::zeros(), cost: 0.0, squares: 0.0 };
-        let inverse = 1.0 / self.sigma;
+        let mut normal = Normal { hessian: Matrix6::zeros(), gradient: Vector6::zeros(), cost: 0.0, squares: [0.0; 2] };
+        let inverse = 1.0 / self.seen.sd.pixels;
         let mut mounted: Option<(usize, Pose)> = None;
-        for sighting in self.sightings {
+        for sighting in &self.seen.pixels {
             let (camera, feature) = (&self.views.cameras[sighting.camera], &self.views.features[sighting.feature]);
             let world_from_camera = match mounted {
                 Some((index, pose)) if index == sighting.camera => pose,
@@ -142,7 +170,7 @@ impl Problem<'_> {
             let squared = glance.error[0] * glance.error[0] + glance.error[1] * glance.error[1];
             let (loss, weight) = huber(squared * inverse * inverse);
             normal.cost += loss;
-            normal.squares += squared;
+            normal.squares[0] += squared;
             let sign = if feature.depth > 0 { 1.0 } else { -1.0 };
             let arm = glance.point - tip.translation;
             let scale = weight * inverse * inverse;
@@ -153,6 +181,23 @@ impl Problem<'_> {
                 normal.gradient -= scaled * error;
                 normal.hessian += scaled * column.transpose();
             }
+        }
+        let inverse = 1.0 / self.seen.sd.points;
+        for sighting in &self.seen.points {
+            let (camera, feature) = (&self.views.cameras[sighting.camera], &self.views.features[sighting.feature]);
+            let world_from_camera = if camera.depth > 0 { *tip * camera.pose } else { camera.pose };
+            let frame = (feature.depth > 0).then_some(tip);
+            let (error, point) = self.views.glance_at_point(sighting, frame, &world_from_camera);
+            let (loss, weight) = huber(error.norm_squared() * inverse * inverse);
+            normal.cost += loss;
+            normal.squares[1] += error.norm_squared();
+            let sign = if feature.depth > 0 { 1.0 } else { -1.0 };
+            let mut columns = Matrix3x6::zeros();
+            columns.fixed_columns_mut::<3>(0).copy_from(&(-(point - tip.translation).cross_matrix() * sign));
+            columns.fixed_columns_mut::<3>(3).fill_diagonal(sign);
+            let scaled = columns.transpose() * (weight * inverse * inverse);
+            normal.gradient -= scaled * error;
+            normal.hessian += scaled * columns;
         }
         normal
     }
@@ -189,7 +234,7 @@ impl Problem<'_> {
     }
 
     fn is_plausible(&self, normal: &Normal) -> bool {
-        is_plausible(normal.cost, (2 * self.sightings.len()) as f64 - 6.0)
+        is_plausible(normal.cost, self.seen.coordinates() - 6.0)
     }
 }
 

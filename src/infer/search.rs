@@ -1,10 +1,10 @@
 //! From a start to the minimum that it leads to, in pixels.
-use super::Sighting;
 use super::branch::{APART, Minimum};
 use super::information::Information;
 use super::joints::Inference;
 use super::pose::is_plausible;
 use super::prior::Prior;
+use super::sighting::Telling;
 use super::starts::Starts;
 
 /// Most Levenberg-Marquardt iterations from one start.
@@ -24,7 +24,7 @@ impl Inference {
     pub(super) fn search(
         &mut self,
         minima: &mut Vec<Minimum>,
-        seen: &[Sighting],
+        seen: &Telling,
         information: &Information,
         prior: &Prior,
     ) {
@@ -41,7 +41,7 @@ impl Inference {
     pub(super) fn add(
         &mut self,
         minima: &mut Vec<Minimum>,
-        seen: &[Sighting],
+        seen: &Telling,
         information: &Information,
         prior: &Prior,
         start: Vec<f64>,
@@ -55,7 +55,7 @@ impl Inference {
     /// The minimum that a start leads to. `None` where the search breaks down, or, `hasty`, is slow.
     pub(super) fn refine(
         &mut self,
-        seen: &[Sighting],
+        seen: &Telling,
         information: &Information,
         prior: &Prior,
         mut joints: Vec<f64>,
@@ -66,9 +66,9 @@ impl Inference {
         // Once more without what limits say, which moves what the pixels determine and leaves the rest where it is.
         self.descend(seen, &information.readings(), &mut joints, hasty)?;
         self.limits.bring_inside(&mut joints, &information.mean);
-        let cost = self.error.look((&self.chain, &self.views), (seen, self.sigma), information, &joints);
+        let cost = self.error.look((&self.chain, &self.views), seen, information, &joints);
         let (settled, open) = information.settled(&self.error.square());
-        let known = self.error.pixels + prior.cost(&joints, &self.limits);
+        let known = self.error.seen + prior.cost(&joints, &self.limits);
         cost.is_finite().then(|| Minimum::new(&self.error, known, joints, (&settled, open)))
     }
 
@@ -76,14 +76,14 @@ impl Inference {
     /// known, which tells what is open.
     pub(super) fn refine_belief(
         &mut self,
-        seen: &[Sighting],
+        seen: &Telling,
         belief: &Information,
         limits: &Information,
         weight: f64,
     ) -> Option<Minimum> {
         let mut joints = belief.mean.clone();
         self.descend(seen, belief, &mut joints, false)?;
-        let cost = self.error.look((&self.chain, &self.views), (seen, self.sigma), belief, &joints);
+        let cost = self.error.look((&self.chain, &self.views), seen, belief, &joints);
         let (_, open) = limits.settled(&(self.error.square() + belief.square() - limits.square()));
         let mut minimum = Minimum::new(&self.error, cost, joints.clone(), (belief, open));
         minimum.cost += weight;
@@ -92,15 +92,9 @@ impl Inference {
     }
 
     /// Levenberg-Marquardt in pixels inside the limits.
-    fn descend(
-        &mut self,
-        seen: &[Sighting],
-        information: &Information,
-        joints: &mut Vec<f64>,
-        hasty: bool,
-    ) -> Option<()> {
-        let Inference { chain, views, limits, sigma, error, trial, .. } = self;
-        let mut cost = error.look((chain, views), (seen, *sigma), information, joints);
+    fn descend(&mut self, seen: &Telling, information: &Information, joints: &mut Vec<f64>, hasty: bool) -> Option<()> {
+        let Inference { chain, views, limits, error, trial, .. } = self;
+        let mut cost = error.look((chain, views), seen, information, joints);
         let (mut lambda, mut mark, mut marked) = (1e-6, cost, 0);
         for iteration in 0..ITERATIONS {
             let step = error.step(limits, joints, lambda)?;
@@ -110,7 +104,7 @@ impl Inference {
                 std::mem::swap(joints, trial);
                 break;
             }
-            let tried = error.look((chain, views), (seen, *sigma), information, trial);
+            let tried = error.look((chain, views), seen, information, trial);
             let change = cost - tried;
             if change > -CONVERGED * (1.0 + cost) {
                 std::mem::swap(joints, trial);
@@ -120,14 +114,14 @@ impl Inference {
                 }
             } else {
                 lambda = (10.0 * lambda).max(1e-3);
-                error.look((chain, views), (seen, *sigma), information, joints);
+                error.look((chain, views), seen, information, joints);
                 if lambda > 1e6 {
                     break;
                 }
             }
             if cost < 0.5 * mark {
                 (mark, marked) = (cost, iteration);
-            } else if hasty && iteration - marked >= PATIENCE && !is_plausible(cost, 2.0 * seen.len() as f64) {
+            } else if hasty && iteration - marked >= PATIENCE && !is_plausible(cost, seen.coordinates()) {
                 return None;
             }
         }

@@ -1,5 +1,6 @@
 //! A detection as a linear function of where its feature is.
-use super::Sighting;
+use super::sighting::{Sd, Telling};
+use super::{PointSighting, Sighting, Sightings};
 use crate::camera::{CameraModel, PARAMETERS};
 use crate::rig::{Model, Parent};
 use handeye_solvers::Pose;
@@ -60,23 +61,34 @@ impl Views {
         Views { cameras: model.cameras.iter().map(view).collect(), features: model.features.iter().map(spot).collect() }
     }
 
-    /// True where both are of the rig and the pixel is finite.
+    /// True where both are of the rig, the camera gives pixels and this one is finite.
     pub fn knows(&self, sighting: &Sighting) -> bool {
         sighting.camera < self.cameras.len()
             && sighting.feature < self.features.len()
+            && self.cameras[sighting.camera].intrinsics[0] != 0.0
             && sighting.pixel.iter().all(|number| number.is_finite())
     }
 
-    /// The sightings that are of the rig and finite, in order.
-    pub fn known(&self, sightings: &[Sighting]) -> Vec<Sighting> {
-        let mut known: Vec<Sighting> = sightings.iter().filter(|sighting| self.knows(sighting)).copied().collect();
-        known.sort_by_key(|sighting| (sighting.camera, sighting.feature));
-        known
+    /// True where both are of the rig and the point is finite.
+    pub fn knows_point(&self, sighting: &PointSighting) -> bool {
+        sighting.camera < self.cameras.len()
+            && sighting.feature < self.features.len()
+            && sighting.point.iter().all(|number| number.is_finite())
     }
 
-    /// Joints between a camera and a feature, which are those that move its pixel: from the first to before the second.
-    pub fn between(&self, sighting: &Sighting) -> (usize, usize) {
-        let (camera, feature) = (self.cameras[sighting.camera].depth, self.features[sighting.feature].depth);
+    /// What is of the rig and finite, in order. `sd`: how good it is.
+    pub(super) fn known(&self, seen: Sightings<'_>, sd: Sd) -> Telling {
+        let mut pixels: Vec<_> = seen.pixels.iter().filter(|sighting| self.knows(sighting)).copied().collect();
+        let mut points: Vec<_> = seen.points.iter().filter(|point| self.knows_point(point)).copied().collect();
+        pixels.sort_by_key(|sighting| (sighting.camera, sighting.feature));
+        points.sort_by_key(|sighting| (sighting.camera, sighting.feature));
+        Telling { pixels, points, sd }
+    }
+
+    /// Joints between a camera and a feature, which are those that move what the camera sees of it: from the first to before the
+    /// second.
+    pub fn between(&self, camera: usize, feature: usize) -> (usize, usize) {
+        let (camera, feature) = (self.cameras[camera].depth, self.features[feature].depth);
         (camera.min(feature), camera.max(feature))
     }
 
@@ -85,6 +97,19 @@ impl Views {
         let camera = &self.cameras[sighting.camera];
         let ray = camera.model.unproject(&camera.intrinsics, sighting.pixel)?;
         (ray.z > 0.0).then(|| ray * (depth / ray.z))
+    }
+
+    /// Predicted minus seen point, along the world's axes, and the feature in the world [m]. Arguments as of [`Views::glance`].
+    #[inline]
+    pub fn glance_at_point(
+        &self,
+        sighting: &PointSighting,
+        feature_frame: Option<&Pose>,
+        world_from_camera: &Pose,
+    ) -> (Vector3<f64>, Vector3<f64>) {
+        let xyz = &self.features[sighting.feature].xyz;
+        let point = feature_frame.map_or(*xyz, |frame| frame.transform(xyz));
+        (point - world_from_camera.transform(&sighting.point.into()), point)
     }
 
     /// `feature_frame`, `world_from_camera`: where the feature's parent and the camera are in the world.

@@ -1,7 +1,7 @@
 //! Predicted minus seen, detection by detection.
 use crate::Error;
 use crate::calibrate::Correspondence;
-use crate::infer::{InferOptions, Inference, Names, Prior, TipInference};
+use crate::infer::{InferOptions, Inference, Names, Prior, Sightings, TipInference};
 use crate::recording::{Recording, Sample};
 use crate::rig::{Model, Rig};
 use handeye_solvers::Pose;
@@ -28,8 +28,8 @@ impl Residual {
     }
 }
 
-/// Of every detection whose camera and feature the rig knows and whose sample's state is read, or determined by its pixels. Readings that
-/// are noisy are refined by the pixels first, as they were when the rig was learned.
+/// Of every pixel whose camera and feature the rig knows and whose sample's state is read, or determined by what was seen. Readings that
+/// are noisy are refined by it first, as they were when the rig was learned.
 ///
 /// Errors: [`Error::Unusable`] where the rig is not complete or has another number of joints.
 pub fn residuals(rig: &Rig, recording: &Recording) -> Result<Vec<Residual>, Error> {
@@ -42,6 +42,9 @@ pub fn residuals(rig: &Rig, recording: &Recording) -> Result<Vec<Residual>, Erro
         for detection in &sample.pixels {
             let known = (index.cameras[detection.camera as usize], index.features[detection.feature as usize]);
             let (Some(camera), Some(feature)) = known else { continue };
+            if !model.cameras[camera].has_lens() {
+                continue;
+            }
             let [u, v] = model.pixel(camera, feature, &links);
             let error = [u - detection.pixel[0], v - detection.pixel[1]];
             residuals.push(Residual { sample: number, camera, feature, seen: detection.pixel, error });
@@ -80,19 +83,20 @@ impl States {
 
     /// `None` where nothing determines them.
     fn links(&mut self, model: &Model, sample: &Sample) -> Result<Option<Vec<Pose>>, Error> {
-        let seen = self.names.sightings(sample);
+        let (pixels, points) = (self.names.sightings(sample), self.names.points(sample));
+        let seen = Sightings { pixels: &pixels, points: &points };
         if let (Some(inference), Some(read)) = (&mut self.joints, &sample.joints) {
             if self.joint_sd <= 0.0 {
                 return Ok(Some(model.links(read)));
             }
-            let refined = inference.joints_near(&seen, &Prior::readings(read, self.joint_sd));
+            let refined = inference.joints_near(seen, &Prior::readings(read, self.joint_sd));
             return Ok(refined.ok().map(|branch| model.links(&branch.joints)));
         }
         if let Some(pose) = sample.pose.filter(|_| self.is_pose_exact) {
             return Ok(Some(vec![model.base, pose]));
         }
         // A chain has no say where its joints were not read; the tip's pose is all that pixels of features on it need.
-        let tip = self.tip.poses(&seen).into_iter().next();
+        let tip = self.tip.poses(seen).into_iter().next();
         Ok(tip.map(|tip| {
             if self.joints.is_some() { vec![tip.pose; model.chain.len() + 1] } else { vec![model.base, tip.pose] }
         }))

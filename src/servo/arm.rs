@@ -127,7 +127,7 @@ impl Arm {
     }
 
     fn follow<'a>(&self, at: &'a Configuration, sighting: &Sighting, glance: Glance) -> Sight<'a> {
-        let (from, to) = self.views.between(sighting);
+        let (from, to) = self.views.between(sighting.camera, sighting.feature);
         let sign = if self.views.features[sighting.feature].depth == to { 1.0 } else { -1.0 };
         let rows = glance.rows.map(|row| row * sign);
         Sight { error: glance.error, axes: &at.posture.axes, rows, point: glance.point, from, to }

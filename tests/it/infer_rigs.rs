@@ -3,10 +3,11 @@
 use crate::infer::{follows_chi_square, inference, record, wrap};
 use crate::learning::variants;
 use handeye::chain::JointKind;
-use handeye::infer::{Branch, Moment, Prior, Sighting};
+use handeye::infer::{Branch, Moment, Names, Prior, Sighting, Sightings};
 use handeye::rig::{Model, Rig, catalog};
-use handeye::simulate::random_rig;
-use nalgebra::DVector;
+use handeye::simulate::{SimulateOptions, Simulation, random_rig, simulate};
+use handeye::solvers::manifold::so3;
+use nalgebra::{DVector, Vector6};
 use std::f64::consts::TAU;
 
 /// Every revolute joint may turn by 2π to either side.
@@ -246,4 +247,50 @@ fn the_same_seed_infers_the_same_and_wrong_detections_do_not_spoil_it() {
         right += usize::from(error(&rig, &found[0], &truth).amax() < 0.05);
     }
     assert!(right >= 48, "{right} of 50 with two wrong detections");
+}
+
+/// A depth camera's points alone, to 1 mm, and beside its pixels: joints and poses are as far off as their covariance says, and one
+/// wrong point of twelve moves them by less than it is off.
+#[test]
+fn points_of_depth_cameras_tell_of_joints_and_poses() {
+    for with_pixels in [false, true] {
+        let (mut of_joints, mut of_poses, mut joints, mut poses) = (0.0, 0.0, 0, 0);
+        for seed in 0..60 {
+            let mut rig = variants::depth(1, seed);
+            rig.noise.points = 0.001;
+            let options = SimulateOptions { samples: 1, seed, ..SimulateOptions::default() };
+            let Simulation { recording, truth, .. } = simulate(&rig, &options).unwrap();
+            let names = Names::new(&rig, &recording);
+            let (pixels, mut points) = (names.sightings(&recording.samples[0]), names.points(&recording.samples[0]));
+            if !with_pixels {
+                let camera = &mut rig.cameras[0];
+                (camera.fx, camera.fy, camera.cx, camera.cy) = (None, None, None, None);
+            }
+            let (model, mut inference) = (Model::new(&rig).unwrap(), inference(&rig));
+            let true_joints = truth.samples[0].joints.as_ref().unwrap();
+            let tip = model.tip(true_joints);
+            // Without a lens, its pixels say nothing.
+            let seen = Sightings { pixels: &pixels, points: &points };
+            let pose = &inference.poses(seen)[0];
+            let turn = so3::log(&(pose.pose.rotation * tip.rotation.transpose()));
+            let shift = pose.pose.translation - tip.translation;
+            let off = Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z);
+            of_poses += pose.covariance.cholesky().unwrap().solve(&off).dot(&off);
+            poses += 1;
+            assert!(pose.rms_points_m > 0.0 && (pose.rms_px > 0.0) == with_pixels);
+            let branches = inference.joints(seen, &Prior::none()).unwrap();
+            let is_gaussian = |branch: &Branch| branch.covariance.diagonal().iter().all(|x| x.sqrt() < GAUSSIAN);
+            if branches.iter().all(|branch| branch.open.is_empty() && is_gaussian(branch)) {
+                of_joints += nearest(&rig, &branches, true_joints);
+                joints += 1;
+            }
+            points[0].point[2] += 0.3;
+            let spoilt = &inference.poses(Sightings { pixels: &pixels, points: &points })[0];
+            let moved = (spoilt.pose.translation - tip.translation).norm();
+            assert!(moved < 0.02, "seed {seed}: a point 0.3 m off moves the tip by {moved} m");
+        }
+        follows_chi_square(of_poses, 6 * poses);
+        assert!(joints > 20, "{joints} arms are seen well enough");
+        follows_chi_square(of_joints, 6 * joints);
+    }
 }
