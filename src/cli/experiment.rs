@@ -1,4 +1,4 @@
-//! `handeye experiment`: the paper's experiments in simulation, beside its figures.
+//! `handeye experiment`: published experiments in simulation, beside their figures.
 use super::answer::Answer;
 use super::inputs::check_output;
 use super::table::Table;
@@ -9,10 +9,10 @@ use handeye::experiments::{ALL, Experiment, Options, Outcome, Published, Row, fi
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// Run an experiment of the paper in simulation, and print it beside the published figures
+/// Run a published experiment in simulation, and print it beside the published figures
 ///
-/// `handeye experiment list` names them. The paper is Gothoskar et al., "Learning a generative model for robot control using
-/// visual feedback".
+/// `handeye experiment list` names them: those of Gothoskar et al., "Learning a generative model for robot control using
+/// visual feedback", and of Ramirez, "Towards Practical Uncalibrated Visual Servoing".
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -75,7 +75,12 @@ fn text(experiment: &Experiment, options: &Options, outcome: &Outcome) -> String
         outcome.measure
     );
     let failed = outcome.rows.iter().any(|row| row.failed > 0);
-    let mut table = Table::new(&["", "published (sd)", "ours (sd)", "median", if failed { "failed" } else { "" }]);
+    let reconstructed = outcome.rows.iter().any(|row| row.reconstructed.is_some());
+    let mut head = vec!["", "published (sd)", "ours (sd)", "median", if failed { "failed" } else { "" }];
+    if reconstructed {
+        head.insert(2, "reconstructed");
+    }
+    let mut table = Table::new(&head);
     for row in &outcome.rows {
         // As the paper prints it.
         let published = row.published.map(|Published { mean, sd }| match sd {
@@ -84,8 +89,12 @@ fn text(experiment: &Experiment, options: &Options, outcome: &Outcome) -> String
         });
         let failures = if row.failed > 0 { row.failed.to_string() } else { String::new() };
         let median = row.median().map_or_else(|| "-".to_owned(), figure);
-        let cells = [published.unwrap_or_else(|| "-".to_owned()), spread(row.mean(), row.sd()), median, failures];
-        table.row([row.label.clone()].into_iter().chain(cells));
+        let mut cells = vec![row.label.clone(), published.unwrap_or_else(|| "-".to_owned())];
+        if reconstructed {
+            cells.push(row.reconstructed.map_or_else(|| "-".to_owned(), |figure| figure.to_string()));
+        }
+        cells.extend([spread(row.mean(), row.sd()), median, failures]);
+        table.row(cells);
     }
     text += &table.to_string();
     if !outcome.notes.is_empty() {
@@ -121,6 +130,7 @@ fn to_json(experiment: &Experiment, options: &Options, outcome: &Outcome) -> Val
             "series": row.series,
             "x": row.x,
             "published": row.published.map(|published| json!({ "mean": published.mean, "sd": published.sd })),
+            "reconstructed": row.reconstructed,
             "mean": row.mean(),
             "sd": row.sd(),
             "median": row.median(),

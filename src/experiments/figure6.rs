@@ -15,6 +15,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     source: "Gothoskar et al., figure 6",
     trials: 60,
     is_timed: false,
+    is_seeded: true,
     run,
 };
 

@@ -10,6 +10,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     source: "Gothoskar et al., figure 7",
     trials: 60,
     is_timed: false,
+    is_seeded: true,
     run,
 };
 

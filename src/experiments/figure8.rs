@@ -12,6 +12,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     source: "Gothoskar et al., figure 8, whose curve has no numbers; these are ViSP's",
     trials: 10,
     is_timed: false,
+    is_seeded: true,
     run,
 };
 

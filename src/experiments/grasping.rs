@@ -13,6 +13,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     source: "Gothoskar et al., figure 12, in words",
     trials: 20,
     is_timed: false,
+    is_seeded: true,
     run,
 };
 

@@ -1,7 +1,9 @@
-//! The experiments of the paper in simulation, beside its published figures: Gothoskar, Lázaro-Gredilla, Agarwal, Bekiroglu,
-//! George, "Learning a generative model for robot control using visual feedback".
+//! Published experiments in simulation, beside their figures: of the paper, Gothoskar, Lázaro-Gredilla, Agarwal, Bekiroglu, George,
+//! "Learning a generative model for robot control using visual feedback", and of the thesis, Ramirez, "Towards Practical Uncalibrated
+//! Visual Servoing".
 //!
 //! One file each; being listed in [`ALL`] is what runs it from the command line and covers it by the tests.
+pub mod camera_rotation;
 mod figure10;
 mod figure11;
 mod figure3;
@@ -45,7 +47,7 @@ pub struct Options {
     pub seed: u64,
 }
 
-/// One experiment of the paper.
+/// One published experiment.
 #[derive(Clone, Copy, Debug)]
 pub struct Experiment {
     /// Its name on the command line.
@@ -58,10 +60,12 @@ pub struct Experiment {
     pub trials: usize,
     /// True where the figures are times, which no seed makes the same.
     pub is_timed: bool,
+    /// False where nothing is drawn, so that every seed gives the same figures.
+    pub is_seeded: bool,
     run: fn(&Options) -> Result<Outcome, Error>,
 }
 
-/// Every experiment, in the paper's order.
+/// Every experiment, in the order of the paper, then of the thesis.
 pub const ALL: &[Experiment] = &[
     table1::EXPERIMENT,
     table2::EXPERIMENT,
@@ -82,6 +86,9 @@ pub const ALL: &[Experiment] = &[
     figure11::EXPERIMENT,
     grasping::EXPERIMENT,
     insertion::EXPERIMENT,
+    camera_rotation::TABLE5_1,
+    camera_rotation::TABLE5_2,
+    camera_rotation::TABLE5_3,
 ];
 
 /// The experiment of that name.

@@ -24,8 +24,10 @@ pub struct Row {
     pub label: String,
     /// Its place along the abscissa.
     pub x: Option<f64>,
-    /// What the paper gives.
+    /// What the publication gives.
     pub published: Option<Published>,
+    /// What an independent reconstruction of the publication comes to, where there is one.
+    pub reconstructed: Option<f64>,
     /// Ours, one per trial that came to a result.
     pub values: Vec<f64>,
     /// Trials in which nothing could be learned.
@@ -58,7 +60,7 @@ impl Row {
     pub(super) fn new(label: impl Into<String>, published: Option<Published>, results: &[Option<f64>]) -> Row {
         let values: Vec<f64> = results.iter().flatten().copied().collect();
         let failed = results.len() - values.len();
-        Row { series: "", label: label.into(), x: None, published, values, failed }
+        Row { series: "", label: label.into(), x: None, published, reconstructed: None, values, failed }
     }
 
     /// The same as a point of a curve.

@@ -18,6 +18,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     source: "Gothoskar et al., table 2",
     trials: 20,
     is_timed: false,
+    is_seeded: true,
     run,
 };
 

@@ -17,6 +17,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     source: "Gothoskar et al., table 3",
     trials: 50,
     is_timed: true,
+    is_seeded: true,
     run,
 };
 

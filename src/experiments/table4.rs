@@ -9,6 +9,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     source: "Gothoskar et al., table 4",
     trials: 10,
     is_timed: false,
+    is_seeded: true,
     run,
 };
 

@@ -16,6 +16,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     source: "Gothoskar et al., table 6",
     trials: 20,
     is_timed: false,
+    is_seeded: true,
     run,
 };
 

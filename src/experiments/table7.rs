@@ -13,6 +13,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     source: "Gothoskar et al., table 7",
     trials: 50,
     is_timed: false,
+    is_seeded: true,
     run,
 };
 

@@ -15,6 +15,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     source: "Gothoskar et al., table 8",
     trials: 20,
     is_timed: false,
+    is_seeded: true,
     run,
 };
 

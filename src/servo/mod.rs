@@ -24,6 +24,7 @@ mod step;
 mod stop;
 mod takes;
 pub mod tasks;
+pub mod uncalibrated;
 
 pub use crate::simulate::world::Command;
 pub use approach::stretched;

@@ -1,4 +1,4 @@
-//! `handeye experiment` repeats the paper's experiments in simulation, beside the published figures, and is no worse.
+//! `handeye experiment` repeats published experiments in simulation, beside the published figures, and is no worse.
 use crate::cli::Folder;
 use handeye::experiments::{ALL, Options, Outcome, find};
 use serde_json::Value;
@@ -25,6 +25,9 @@ const PUBLISHED: &[(&str, &[&str])] = &[
     ("figure11", &["pixel accuracy at 0.01 and at 0.02 rad"]),
     ("grasping", &["1.3, 1.2, 1.1 and 1.0", "grasping can be done consistently"]),
     ("insertion", &["1.3, 1.2, 1.1 and 1.0", "tight fits are inserted"]),
+    ("table5.1", &["8.151261", "0.00766", "8.900662", "3.088608", "2.945055"]),
+    ("table5.2", &["5.264595", "0.003251", "3.16129", "0.000273", "3.145695"]),
+    ("table5.3", &["8.868672", "0.006711", "8.769231", "6.246298", "0.003606"]),
 ];
 
 fn run(name: &str, trials: usize) -> Outcome {
@@ -47,12 +50,15 @@ fn every_experiment_is_listed_runs_and_prints_what_was_published() {
     assert_eq!(names, PUBLISHED.iter().map(|(name, _)| *name).collect::<Vec<_>>());
     for ((name, figures), line) in PUBLISHED.iter().zip(list.lines()) {
         assert!(line.trim().starts_with(name), "{line}");
-        let (text, _) = folder.expect(0, &format!("experiment {name} --trials 2"));
+        let experiment = find(name).unwrap();
+        // Of the places of cameras, some diverge.
+        let trials = if experiment.trials == 360 { 8 } else { 2 };
+        let (text, _) = folder.expect(0, &format!("experiment {name} --trials {trials}"));
         for figure in *figures {
             assert!(text.contains(figure), "`{figure}` is not in\n{text}");
         }
-        assert!(text.contains("Gothoskar et al., "), "{text}");
-        let (json, _) = folder.expect(0, &format!("experiment {name} --trials 2 --json"));
+        assert!(text.contains(experiment.source), "{text}");
+        let (json, _) = folder.expect(0, &format!("experiment {name} --trials {trials} --json"));
         let json: Value = serde_json::from_str(&json).unwrap();
         let rows = json["rows"].as_array().unwrap();
         let filled = |row: &Value| row["failed"] == 0 && row["median"].as_f64().is_some_and(f64::is_finite);
@@ -69,7 +75,8 @@ fn the_same_seed_gives_the_same_figures_on_any_number_of_threads_and_another_see
         };
         let one = run(1, 3);
         assert_eq!(one, run(3, 3), "{} depends on the threads", experiment.name);
-        assert_ne!(one.rows, run(1, 4).rows, "{} does not depend on the seed", experiment.name);
+        let other = run(1, 4).rows;
+        assert_eq!(one.rows != other, experiment.is_seeded, "{} and the seed", experiment.name);
     }
 }
 

@@ -1,0 +1,88 @@
+//! One servo run in the scene, and runs around the target.
+use super::world::{Scene, Tracker, View, World};
+use crate::Error;
+use crate::servo::LimitRows;
+use crate::servo::uncalibrated::{Phase, Settings, Stop, Uncalibrated};
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+
+/// How a run went.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// Sum of the absolute errors before each iteration and after the last [px]; fewer where it was stopped.
+    pub errors: Vec<f64>,
+    /// The same of the points in space, at the end [m].
+    pub error_3d: f64,
+    /// Condition number after exploring; `None` where that found none.
+    pub condition: Option<f64>,
+    /// Why it was stopped, where it was.
+    pub stop: Option<Stop>,
+}
+
+/// Iterations of a run.
+const ITERATIONS: usize = 50;
+
+/// The error below which the thesis counts steps [px].
+const NEAR: f64 = 10.0;
+
+impl Run {
+    /// True where the errors grew by more than the settings allow.
+    pub fn diverged(&self) -> bool {
+        matches!(self.stop, Some(Stop::Diverged { .. }))
+    }
+
+    /// Iterations, in strides of `every`, until the errors sum up to less than 10 px; `None` where they never do.
+    pub fn steps(&self, every: usize) -> Option<usize> {
+        self.errors.iter().step_by(every).position(|error| *error < NEAR)
+    }
+}
+
+/// Servoes from the start, 50 iterations after exploring.
+///
+/// Errors: what [`Uncalibrated::new`] refuses.
+pub fn serve(world: &mut World, settings: &Settings) -> Result<Run, Error> {
+    let mut servo = Uncalibrated::new(world.quantities(), world.rows(), settings.clone())?;
+    let mut limits = LimitRows::default();
+    limits.clear(world.joints().len());
+    let mut run = Run { errors: Vec::new(), error_3d: 0.0, condition: None, stop: None };
+    while run.errors.len() <= ITERATIONS {
+        let (errors, joints) = (world.errors(), world.joints().to_vec());
+        let command = servo.step(&joints, &errors, &limits, 1.0)?;
+        let (motion, phase) = (command.motion.to_vec(), command.phase.clone());
+        if phase != Phase::Exploring {
+            if let (true, Some(estimate)) = (run.errors.is_empty(), servo.estimate()) {
+                run.condition = Some(estimate.condition());
+            }
+            run.errors.push(errors.iter().map(|error| error.abs()).sum());
+        }
+        if let Phase::Stopped(stop) = phase {
+            run.stop = Some(stop);
+            break;
+        }
+        if run.errors.len() <= ITERATIONS {
+            let there: Vec<f64> = joints.iter().zip(&motion).map(|(joint, motion)| joint + motion).collect();
+            world.move_to(&there);
+        }
+    }
+    run.error_3d = world.error_3d();
+    Ok(run)
+}
+
+/// Runs with a pair of cameras at as many places around the target, evenly.
+///
+/// Errors: as [`serve`].
+pub fn carried_around(
+    scene: &Scene,
+    tracker: Tracker,
+    settings: &Settings,
+    placements: usize,
+    seed: u64,
+) -> Result<Vec<Run>, Error> {
+    let place = |index: usize| {
+        let angle = TAU * index as f64 / placements as f64;
+        let seed = seed.wrapping_mul(1_000_000).wrapping_add(index as u64);
+        serve(&mut World::new(scene, &View::pair(angle), tracker, seed)?, settings)
+    };
+    let runs: Vec<Result<Run, Error>> = (0..placements).into_par_iter().map(place).collect();
+    runs.into_iter().collect()
+}

@@ -1,0 +1,79 @@
+//! What a motion teaches: the updates of an estimate.
+use super::estimate::{Estimate, dot};
+use super::settings::Update;
+
+/// A motion, and the errors before and after it [px]; NaN where a row was not seen.
+pub(super) struct Lesson<'a> {
+    pub motion: &'a [f64],
+    pub before: &'a [f64],
+    pub now: &'a [f64],
+    /// Rows that are seen now.
+    pub seen: &'a [usize],
+}
+
+/// Bounds of the ratio of a squared surprise to the expected one by which the curvature follows, and of the curvature over its setting.
+const SURPRISE: [f64; 2] = [0.2, 5.0];
+const CURVATURES: [f64; 2] = [0.5, 3.0];
+
+/// Learns. `curvature`: the setting.
+pub(super) fn learn(update: Update, curvature: f64, estimate: &mut Estimate, lesson: &Lesson<'_>) {
+    match update {
+        Update::Adaptive => return filter(curvature, estimate, lesson),
+        Update::Broyden { rate, gate } if tells(estimate, lesson, gate) => {
+            let square = dot(lesson.motion, lesson.motion);
+            for (row, change) in changes(lesson) {
+                let news = change - dot(estimate.slopes(row), lesson.motion);
+                estimate.tilt(row, rate * news / square, lesson.motion);
+            }
+        }
+        Update::LeastSquares { forgetting, gate } if tells(estimate, lesson, gate) => {
+            estimate.forget(1.0 / forgetting);
+            estimate.moved(lesson.motion, 0.0);
+            for (row, _) in changes(lesson) {
+                estimate.measured(row, lesson.now[row]);
+            }
+        }
+        Update::Keep | Update::Broyden { .. } | Update::LeastSquares { .. } => {}
+    }
+    for &row in lesson.seen {
+        estimate.reset(row, lesson.now[row]);
+    }
+}
+
+/// Changes of the rows that were seen before and after the motion [px].
+fn changes<'a>(lesson: &Lesson<'a>) -> impl Iterator<Item = (usize, f64)> + use<'a> {
+    let (before, now) = (lesson.before, lesson.now);
+    lesson
+        .seen
+        .iter()
+        .map(move |&row| (row, now[row] - before.get(row).unwrap_or(&f64::NAN)))
+        .filter(|(_, change)| change.is_finite())
+}
+
+/// Whether both the change that was seen and what is new of it exceed so many standard deviations of their noise.
+fn tells(estimate: &Estimate, lesson: &Lesson<'_>, gate: f64) -> bool {
+    let (mut change, mut news, mut rows) = (0.0, 0.0, 0.0);
+    for (row, difference) in changes(lesson) {
+        let variance = 2.0 * estimate.variance(row);
+        change += difference * difference / variance;
+        news += (difference - dot(estimate.slopes(row), lesson.motion)).powi(2) / variance;
+        rows += 1.0;
+    }
+    lesson.motion.iter().any(|motion| *motion != 0.0) && f64::min(change, news) >= gate * gate * rows
+}
+
+fn filter(setting: f64, estimate: &mut Estimate, lesson: &Lesson<'_>) {
+    estimate.moved(lesson.motion, estimate.curvature);
+    let (mut surprise, mut expected, mut noise) = (0.0, 0.0, 0.0);
+    for &row in lesson.seen {
+        let [difference, variance] = estimate.measured(row, lesson.now[row]);
+        surprise += difference * difference;
+        expected += variance;
+        noise += 2.0 * estimate.variance(row);
+    }
+    if expected > noise {
+        let ratio = (surprise / expected).clamp(SURPRISE[0], SURPRISE[1]);
+        let curvature = estimate.curvature * ratio.powf(0.25 * (1.0 - noise / expected));
+        estimate.curvature = curvature.clamp(CURVATURES[0] * setting, CURVATURES[1] * setting);
+    }
+}

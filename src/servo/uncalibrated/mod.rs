@@ -1,0 +1,20 @@
+//! Servoing without a rig: the Jacobian from what is controlled to what is seen is estimated by moving, and kept on the way.
+//!
+//! Whatever is controlled are [`Quantity`]s: joints, coordinates of a tip, the heading of a drone. Whatever is seen are rows: errors in
+//! pixels that shall become 0, each with its [`Row::sd`]. [`Uncalibrated`] explores, servoes through the same constrained step as with a
+//! rig, and stops where it must. After Ramirez, "Towards Practical Uncalibrated Visual Servoing", 2016; [`Settings::plain`] is his
+//! controller, the defaults are ours.
+mod checks;
+mod controller;
+mod estimate;
+mod exploration;
+mod learning;
+mod settings;
+mod signals;
+mod trust;
+mod views;
+
+pub use controller::Uncalibrated;
+pub use estimate::Estimate;
+pub use settings::{Exploration, Settings, Trust, Update};
+pub use signals::{Command, Phase, Quantity, Row, Stop};

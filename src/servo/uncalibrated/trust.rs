@@ -1,0 +1,147 @@
+//! How far an estimated Jacobian is followed: a motion without limits, its damping, and the share of it that is safe.
+use super::estimate::{Estimate, dot};
+use super::settings::Trust;
+
+/// The damped Gauss-Newton step of an estimate's rows; kept from step to step.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Aim {
+    hessian: Vec<f64>,
+    gradient: Vec<f64>,
+    factor: Vec<f64>,
+    /// The step.
+    pub motion: Vec<f64>,
+    /// δ that was added to the diagonal of H.
+    pub damping: f64,
+    /// A condition number of the rows, from below.
+    pub condition: f64,
+    /// Largest over smallest pivot of the last factors.
+    pivots: f64,
+    /// Σ s² / σ² over the rows.
+    slopes: f64,
+}
+
+/// Least damping, as a share of the largest diagonal entry of H.
+const LEAST: f64 = 1e-12;
+
+/// Steps of the search for a damping that suits the length of its motion: to 3 %.
+const SEARCH: usize = 5;
+
+impl Aim {
+    /// Minimises |J d + e|² + ½ c Σs² |d|⁴ over the rows, which are divided by their standard deviations; c is the restraint. False where
+    /// the rows do not determine a motion.
+    pub fn update(&mut self, n: usize, estimate: &Estimate, rows: &[usize], restraint: f64) -> bool {
+        self.normal_equations(n, estimate, rows);
+        let largest = (0..n).map(|i| self.hessian[i * n + i]).fold(0.0, f64::max);
+        let least = LEAST * largest;
+        if !self.solve(n, least) {
+            return false;
+        }
+        (self.damping, self.condition) = (least, self.pivots.sqrt());
+        let weight = restraint * self.slopes;
+        if weight > 0.0 {
+            // r = |d(weight r²)|, whose right side falls with r by a power between 0 and 2: the geometric mean of both sides halves what
+            // is left to it.
+            let mut length = self.length();
+            for _ in 0..SEARCH {
+                self.damping = least + weight * length * length;
+                if !self.solve(n, self.damping) {
+                    return false;
+                }
+                length = (length * self.length()).sqrt();
+            }
+        }
+        true
+    }
+
+    /// By how much the motion would reduce the sum of the squared errors over their variances.
+    pub fn removable(&self) -> f64 {
+        dot(&self.gradient, &self.motion)
+    }
+
+    fn length(&self) -> f64 {
+        dot(&self.motion, &self.motion).sqrt()
+    }
+
+    fn normal_equations(&mut self, n: usize, estimate: &Estimate, rows: &[usize]) {
+        self.hessian.clear();
+        self.hessian.resize(n * n, 0.0);
+        self.gradient.clear();
+        self.gradient.resize(n, 0.0);
+        self.slopes = 0.0;
+        for &row in rows {
+            let (slopes, weight) = (estimate.slopes(row), 1.0 / estimate.variance(row));
+            self.slopes += weight * estimate.scale(row);
+            for i in 0..n {
+                let slope = weight * slopes[i];
+                self.gradient[i] -= slope * estimate.error(row);
+                let line = &mut self.hessian[i * n..i * n + i + 1];
+                line.iter_mut().zip(slopes).for_each(|(entry, other)| *entry += slope * other);
+            }
+        }
+    }
+
+    /// Solves (H + δ I) d = g by Cholesky's factors.
+    fn solve(&mut self, n: usize, damping: f64) -> bool {
+        self.factor.clone_from(&self.hessian);
+        let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
+        for i in 0..n {
+            self.factor[i * n + i] += damping;
+            for j in 0..=i {
+                let (before, line) = self.factor.split_at_mut(i * n);
+                if j < i {
+                    let rest = line[j] - dot(&line[..j], &before[j * n..j * n + j]);
+                    line[j] = rest / before[j * n + j];
+                } else {
+                    let rest = line[i] - dot(&line[..i], &line[..i]);
+                    (least, most) = (least.min(rest), most.max(rest));
+                    if rest.is_nan() || rest <= 0.0 {
+                        return false;
+                    }
+                    line[i] = rest.sqrt();
+                }
+            }
+        }
+        self.pivots = most / least;
+        self.motion.clone_from(&self.gradient);
+        for i in 0..n {
+            let rest = self.motion[i] - dot(&self.factor[i * n..i * n + i], &self.motion[..i]);
+            self.motion[i] = rest / self.factor[i * n + i];
+        }
+        for i in (0..n).rev() {
+            let later: f64 = (i + 1..n).map(|k| self.factor[k * n + i] * self.motion[k]).sum();
+            self.motion[i] = (self.motion[i] - later) / self.factor[i * n + i];
+        }
+        true
+    }
+
+    /// The share of `gain` times the motion that is safe, in (0, 1].
+    ///
+    /// With doubt p from the slopes' covariance and c from their curvature, the errors of the m rows sum up to at most
+    /// (1 - t λ) E + z √(m (t² p + t⁴ c)) after a share t; what that grows by shall be below `growth` [px].
+    pub fn share(&self, estimate: &Estimate, rows: &[usize], gain: f64, trust: &Trust, growth: f64) -> f64 {
+        let length = gain * self.length();
+        let longest = if length > trust.motion { trust.motion / length } else { 1.0 };
+        let (mut doubt, mut bend, mut errors) = (0.0, 0.0, 0.0);
+        for &row in rows {
+            doubt += estimate.doubt(row, &self.motion);
+            bend += estimate.scale(row);
+            errors += estimate.error(row).abs();
+        }
+        let m = rows.len() as f64;
+        let doubt = m * gain * gain * doubt;
+        let bend = m * 0.25 * estimate.curvature.powi(2) * bend * length.powi(4);
+        let safe = |share: f64| {
+            let wrong = trust.confidence * (share * share * doubt + share.powi(4) * bend).sqrt();
+            wrong <= share * gain * errors + growth
+        };
+        if safe(longest) {
+            return longest;
+        }
+        let (mut low, mut high) = (0.0, longest);
+        for _ in 0..20 {
+            let middle = 0.5 * (low + high);
+            if safe(middle) { low = middle } else { high = middle }
+        }
+        low
+    }
+}
