@@ -1,0 +1,116 @@
+//! Servoing without a rig: default settings beside a Jacobian that is kept, cameras carried around the target; and CPU time of one step.
+//!
+//! `cargo bench --bench uncalibrated -- [SCENES [PLACES]]`: scenes drawn beside the reconstructed one, and places of the cameras in each.
+//! Iterations, image and 3D errors are ratios to those with the Jacobian kept, over the places where that arrives: mean over the rows, and
+//! largest. A row is one scene, exploratory motion and gain. Last stand the iterations on the reconstructed scene, most of its rows.
+use cpu_time::ThreadTime;
+use handeye::experiments::camera_rotation::{Run, Scene, Tracker, View, World, carried_around};
+use handeye::servo::LimitRows;
+use handeye::servo::uncalibrated::{Exploration, Phase, Settings, Uncalibrated};
+
+const TRACKERS: [(&str, Tracker); 3] =
+    [("perfect", Tracker::Perfect), ("rounded", Tracker::Rounded), ("0.2 px", Tracker::Gaussian(0.2))];
+const SIZES_DEG: [f64; 5] = [2.0, 4.0, 6.0, 8.0, 10.0];
+const GAINS: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
+
+/// Errors below these count as none [px, m].
+const NONE: [f64; 2] = [1e-3, 1e-6];
+
+fn main() {
+    let numbers: Vec<usize> = std::env::args().filter_map(|argument| argument.parse().ok()).collect();
+    let scenes = numbers.first().copied().unwrap_or(4);
+    let places = numbers.get(1).copied().unwrap_or(36);
+    let drawn = (0..scenes as u64).map(|seed| Scene::drawn(seed).expect("the shipped arm"));
+    let scenes: Vec<Scene> = std::iter::once(Scene::RECONSTRUCTED).chain(drawn).collect();
+    println!("{} scenes, {places} places of the cameras, ratios to the Jacobian kept as mean / largest", scenes.len());
+    println!(
+        "{:8} {:>5} {:>9} {:>9} {:>14} {:>14} {:>14} {:>13}",
+        "tracker", "gain", "diverged", "kept", "iterations", "image error", "3D error", "reconstructed"
+    );
+    for (name, tracker) in TRACKERS {
+        for gain in GAINS {
+            row(name, tracker, gain, &scenes, places);
+        }
+    }
+    time();
+}
+
+fn row(name: &str, tracker: Tracker, gain: f64, scenes: &[Scene], places: usize) {
+    let (mut diverged, mut diverged_kept) = (0, 0);
+    let mut ratios: [Vec<f64>; 3] = Default::default();
+    let mut reconstructed = Vec::new();
+    for (index, scene) in scenes.iter().enumerate() {
+        for size_deg in SIZES_DEG {
+            let size = size_deg.to_radians();
+            let around = |settings: &Settings| {
+                carried_around(scene, tracker, settings, places, 1).expect("settings that may be")
+            };
+            let kept = around(&Settings::plain(gain, size));
+            let ours = around(&Settings { gain, exploration: Exploration::fixed(size), ..Settings::default() });
+            diverged += ours.iter().filter(|run| run.stop.is_some()).count();
+            diverged_kept += kept.iter().filter(|run| run.diverged()).count();
+            let arrive = |run: &Run| !run.diverged() && run.steps(1).is_some();
+            let both: Vec<usize> = (0..places).filter(|i| arrive(&kept[*i]) && arrive(&ours[*i])).collect();
+            let figures = |runs: &[Run]| -> [f64; 3] {
+                [
+                    mean(both.iter().map(|i| runs[*i].steps(1).unwrap_or(0) as f64)),
+                    mean(both.iter().map(|i| runs[*i].errors.last().copied().unwrap_or(0.0))).max(NONE[0]),
+                    mean(both.iter().map(|i| runs[*i].error_3d)).max(NONE[1]),
+                ]
+            };
+            let (ours_are, kept_are) = (figures(&ours), figures(&kept));
+            if !both.is_empty() {
+                (0..3).for_each(|k| ratios[k].push(ours_are[k] / kept_are[k]));
+            }
+            if index == 0 {
+                reconstructed.push(mean(ours.iter().filter_map(|run| run.steps(1)).map(|steps| steps as f64)));
+            }
+        }
+    }
+    let cell = |ratios: &Vec<f64>| {
+        format!("{:.2} / {:.2}", mean(ratios.iter().copied()), ratios.iter().copied().fold(0.0, f64::max))
+    };
+    let worst = reconstructed.iter().copied().fold(0.0, f64::max);
+    let [iterations, image, space] = ratios.each_ref().map(cell);
+    println!(
+        "{name:8} {gain:>5} {diverged:>9} {diverged_kept:>9} {iterations:>14} {image:>14} {space:>14} {worst:>13.2}"
+    );
+}
+
+fn mean(figures: impl Iterator<Item = f64>) -> f64 {
+    let all: Vec<f64> = figures.collect();
+    all.iter().sum::<f64>() / all.len().max(1) as f64
+}
+
+/// One step of 6 joints and 12 rows, with no limit active.
+fn time() {
+    let mut world =
+        World::new(&Scene::RECONSTRUCTED, &View::pair(0.0), Tracker::Gaussian(0.2), 1).expect("the shipped arm");
+    let mut limits = LimitRows::default();
+    limits.clear(6);
+    let mut times = Vec::new();
+    for _ in 0..100 {
+        world.move_to(&Scene::RECONSTRUCTED.start);
+        let mut servo =
+            Uncalibrated::new(world.quantities(), world.rows(), Settings::default()).expect("settings that may be");
+        for _ in 0..100 {
+            let (joints, errors) = (world.joints().to_vec(), world.errors());
+            let explored = servo.phase() != &Phase::Exploring;
+            let before = ThreadTime::now();
+            let motion = servo.step(&joints, &errors, &limits, 1.0).expect("6 joints, 12 rows").motion;
+            let elapsed = before.elapsed();
+            let there: Vec<f64> = joints.iter().zip(motion).map(|(joint, motion)| joint + motion).collect();
+            world.move_to(&there);
+            if explored {
+                times.push(1e6 * elapsed.as_secs_f64());
+            }
+        }
+    }
+    times.sort_by(f64::total_cmp);
+    let n = times.len();
+    println!(
+        "\none step of 6 joints and 12 rows: median {:.1} µs (5 wanted), 99 % {:.1} µs",
+        times[n / 2],
+        times[n * 99 / 100]
+    );
+}
