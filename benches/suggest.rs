@@ -19,7 +19,7 @@ const BEFORE: usize = 10;
 const ADDED: [usize; 3] = [1, 3, 5];
 
 fn main() {
-    let seeds = std::env::args().skip(1).find_map(|argument| argument.parse().ok()).unwrap_or(100);
+    let seeds = std::env::args().skip(1).find_map(|argument| argument.parse().ok()).unwrap_or(60);
     println!("medians over {seeds} rigs; of the tip's position: what calibrate then reports, and the true error");
     println!("{:24} {:>6} {:>19} {:>19} {:>19} {:>17}", "", "", "expected", "without the REC", "random", "over random");
     println!(

@@ -96,8 +96,8 @@ pub struct SuggestedSample {
 /// had it; `None` is nothing but what `[estimate]` holds or knows roughly.
 ///
 /// Positions are within the limits of the joints, else within the range that they were in while the rig was learned, and have at
-/// least half of the features in view of a camera; with the recording, from the side from which they were seen. The greedy choice minimises the expected variance of the tip over such
-/// positions (A-optimality). Nothing is known of obstacles.
+/// least half of the features in view of a camera; with the recording, from the side from which they were seen. The greedy choice
+/// minimises the expected variance of the tip over such positions (A-optimality). Nothing is known of obstacles.
 ///
 /// Errors: [`Error::Unusable`] where the rig was not learned, or nothing of it that moves the tip was, or rig and recording do not fit
 /// together; [`Error::NotEnoughData`] where the recording leaves something open, or hardly any position has the features in view.
