@@ -169,6 +169,10 @@ fn constraints_that_cannot_all_hold_are_named_as_a_minimal_set() {
         if trial % 7 == 0 {
             problem.upper[0] = problem.lower[0];
         }
+        if trial % 2 == 0 {
+            // Rows that some unknowns are no part of, and hence constraints that are active beside a conflict.
+            problem.rows.iter_mut().for_each(|slope| *slope *= f64::from(u8::from(random.random_bool(0.5))));
+        }
         let strengths = vec![1.0; m];
         let mut program = QuadraticProgram::new(n, m);
         let found = program.solve(&problem.qp(&strengths));
