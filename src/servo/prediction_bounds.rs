@@ -11,9 +11,10 @@ use nalgebra::Vector3;
 ///   sd(f) ≤ Σ |f(θ + sd_k e_k) - f(θ - sd_k e_k)| / 2   over all numbers θ_k that were learned
 ///
 /// which holds however the numbers' errors are correlated. `[fit.sd]` leaves correlations out, and numbers that were learned together
-/// mostly make up for each other, so that what a rig predicts is better than this, mostly by far. What only a prior determines (a world
-/// frame that nothing fixes) counts with all of the prior. A margin of k sd suits [`super::limits::InImage`] in pixels, and
-/// [`super::limits::HalfSpace`], [`super::limits::TipBox`] and [`super::limits::LinkDistance`] in metres.
+/// mostly make up for each other: a random rig learned from 50 samples of 6 features is bounded to 8 px in the median and off by 0.06 px.
+/// What only a prior determines (a world frame that nothing fixes) counts with all of the prior. It is for where a margin must not be too
+/// small: k sd suits [`super::limits::InImage`] in pixels, and [`super::limits::HalfSpace`], [`super::limits::TipBox`] and
+/// [`super::limits::LinkDistance`] in metres.
 pub struct PredictionBounds {
     arm: Arm,
     /// Both ways by one standard deviation, for every number.
