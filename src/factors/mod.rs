@@ -17,4 +17,4 @@ pub use pose_action::{Motion, PoseAction};
 pub use pose_reading::PoseReading;
 pub use readings::{JointReadings, Polynomial, PoseReadings};
 pub use reprojection::{Intrinsics, Reprojection};
-pub use target::TargetSeen;
+pub use target::{CameraFromTarget, Drifting, TargetSeen};

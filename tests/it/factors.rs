@@ -2,10 +2,10 @@
 use handeye::camera::CameraModel;
 use handeye::chain::{Chain, Convention, JointKind};
 use handeye::factors::{
-    ForwardKinematics, InCamera, Intrinsics, JointAction, JointReading, Motion, PointObservation, PoseAction,
-    PoseReading, Reprojection, TargetSeen,
+    CameraFromTarget, Drifting, ForwardKinematics, InCamera, Intrinsics, JointAction, JointReading, Motion,
+    PointObservation, PoseAction, PoseReading, Reprojection, TargetSeen,
 };
-use handeye::solvers::{DynamicVector, Pose, Vector, check};
+use handeye::solvers::{DynamicVector, Function, Pose, Vector, check};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -58,9 +58,15 @@ fn what_cameras_see_has_the_derivatives_of_differences() {
         let factor = PointObservation { point: (in_camera + place.vector(0.1)).into() };
         check::factor(&factor, &(carrier, feature, mount, camera)).unwrap();
         check::function(&InCamera, &(carrier, feature, mount, camera)).unwrap();
-        let seen = (mount * camera).inverse() * carrier * Pose::new(place.vector(0.2), place.vector(0.1));
         let target = Pose::new(place.vector(0.2), place.vector(0.1));
-        check::factor(&TargetSeen { seen }, &(carrier, target, mount, camera, Vector::<1>::new(1.2))).unwrap();
+        let predicted = CameraFromTarget.compute((carrier, target, mount, camera));
+        check::function(&CameraFromTarget, &(carrier, target, mount, camera)).unwrap();
+        let seen = predicted * Pose::new(place.vector(0.2), place.vector(0.1));
+        let (scale, drift) = (Vector::<1>::new(1.2), Vector::<6>::from_fn(|_, _| 0.1));
+        for camera_stands in [false, true] {
+            check::factor(&TargetSeen { seen, camera_stands }, &(predicted, scale, drift)).unwrap();
+        }
+        check::factor(&Drifting, &(drift, 2.0 * drift)).unwrap();
     }
 }
 

@@ -2,7 +2,7 @@
 use super::graph::{Built, Freedom, State};
 use super::setup::Setup;
 use super::start::Start;
-use super::{residual, turning};
+use super::{scatter, turning};
 use crate::Error;
 use crate::calibrate::{Calibration, PointErrors, Report, StageReport};
 use crate::chain::LINK_PARAMETERS;
@@ -71,14 +71,10 @@ impl Account<'_> {
         let (setup, state) = (self.setup, self.state);
         let (mut used, mut sums, mut samples) = (0, [0.0; 2], vec![false; setup.moments.len()]);
         for (index, view) in setup.views.iter().enumerate() {
-            let r = residual(setup, state, index);
-            let size: f64 = match &view.whitening {
-                Some(rows) => rows.iter().map(|row| row.iter().zip(&r).map(|(w, r)| w * r).sum::<f64>().powi(2)).sum(),
-                None => r.iter().zip(state.sigmas).map(|(r, sigma)| (r / sigma).powi(2)).sum(),
-            };
-            if size < 6.0 * WRONG * WRONG {
+            if scatter::size(setup, state, index) < 6.0 * WRONG * WRONG {
                 used += 1;
                 samples[view.moment] = true;
+                let r = scatter::residual(setup, state, index);
                 (0..6).for_each(|k| sums[k / 3] += r[k] * r[k]);
             }
         }
@@ -143,7 +139,11 @@ impl Account<'_> {
             }
             _ => "what their covariances say",
         };
-        format!("{tips}{clock}; the noise of targets is {targets}")
+        let drift = match self.state.walks {
+            [0.0, 0.0] => String::new(),
+            [rot, xyz] => format!(", and they drift by {:.4}° and {:.2} mm a view", rot.to_degrees(), 1e3 * xyz),
+        };
+        format!("{tips}{clock}; the noise of targets is {targets}{drift}")
     }
 
     fn learned(&self) -> Rig {

@@ -3,7 +3,7 @@ use super::moments::chain_of;
 use super::setup::Setup;
 use crate::Error;
 use crate::chain::LINK_PARAMETERS;
-use crate::factors::{ForwardKinematics, TargetSeen};
+use crate::factors::{CameraFromTarget, Drifting, ForwardKinematics};
 use crate::rig::{JointField, Parameter, Parent};
 use handeye_solvers::{DynamicVector, Graph, Key, LevenbergMarquardt, Loss, Pose, Report, Solver, Termination, Vector};
 use std::sync::Arc;
@@ -22,6 +22,10 @@ pub(super) struct State {
     pub scale: f64,
     /// Standard deviations of a target's pose in its camera: rotation [rad], then translation [m].
     pub sigmas: [f64; 6],
+    /// By how much reports drift from one view of a target to the next: standard deviations of rotations [rad] and translations [m].
+    pub walks: [f64; 2],
+    /// The drift of each view: rotation [rad], then translation [m].
+    pub drifts: Vec<[f64; 6]>,
     /// How far the chain's given values are off [rad, m], where the rig does not say.
     pub spread: [f64; 2],
 }
@@ -39,6 +43,7 @@ pub(super) struct Built {
     pub targets: Vec<Key<Pose>>,
     pub parameters: Option<Key<DynamicVector>>,
     tips: Vec<Key<Pose>>,
+    drifts: Vec<Key<Vector<6>>>,
     pub offset: Key<Vector<1>>,
     pub scale: Key<Vector<1>>,
 }
@@ -76,17 +81,35 @@ pub(super) fn build(setup: &Setup, state: &State, freedom: Freedom, loss: Loss) 
     }
     let (tips, parameters) = tips(&mut graph, setup, state, offset);
     let world = graph.held(Pose::identity());
-    for view in &setup.views {
-        let carrier = |parent: Parent| if parent == Parent::World { world } else { tips[view.moment] };
-        let (mount, carrier) = (carrier(rig.cameras[view.camera].parent), carrier(rig.targets[view.target].parent));
-        let on = (carrier, targets[view.target], mount, cameras[view.camera], scale);
-        let factor = graph.factor(TargetSeen { seen: view.seen }, on).loss(loss);
+    let carrier = |parent: Parent, moment: usize| if parent == Parent::World { world } else { tips[moment] };
+    let still = graph.held(Vector::<6>::zeros());
+    let mut drifts = Vec::with_capacity(setup.views.len());
+    for (index, view) in setup.views.iter().enumerate() {
+        let mount = carrier(rig.cameras[view.camera].parent, view.moment);
+        let below = carrier(rig.targets[view.target].parent, view.moment);
+        let seen = graph.derive(CameraFromTarget, (below, targets[view.target], mount, cameras[view.camera]));
+        let drift = match view.before.filter(|_| state.walks != [0.0; 2]) {
+            Some(before) => drifting(&mut graph, drifts[before], state, index),
+            None => still,
+        };
+        drifts.push(drift);
+        let factor = graph.factor(setup.seen(index), (seen, scale, drift)).loss(loss);
         match view.whitening {
             Some(whitening) => factor.whitening(whitening),
             None => factor.sigmas(state.sigmas),
         };
     }
-    Built { graph, cameras, targets, parameters, tips, offset, scale }
+    Built { graph, cameras, targets, parameters, tips, drifts, offset, scale }
+}
+
+/// A drift that walks on from the one before.
+fn drifting(graph: &mut Graph, before: Key<Vector<6>>, state: &State, index: usize) -> Key<Vector<6>> {
+    let drift = graph.free(Vector::from(state.drifts[index]));
+    let still: Vec<usize> = (0..6).filter(|k| state.walks[k / 3] == 0.0).collect();
+    graph.hold_coordinates(drift, &still);
+    let sigmas = std::array::from_fn(|k| if state.walks[k / 3] > 0.0 { state.walks[k / 3] } else { 1.0 });
+    graph.factor(Drifting, (before, drift)).sigmas(sigmas);
+    drift
 }
 
 /// Tips derived from joints and chain, free under the noise of their readings, derived from the offset, or held.
@@ -183,6 +206,7 @@ impl Built {
         let graph = &self.graph;
         let poses = |keys: &[Key<Pose>]| keys.iter().map(|key| graph.value(*key)).collect::<Vec<_>>();
         (state.cameras, state.targets, state.tips) = (poses(&self.cameras), poses(&self.targets), poses(&self.tips));
+        state.drifts = self.drifts.iter().map(|key| graph.value(*key).into()).collect();
         state.offset = graph.value(self.offset)[0];
         state.scale = graph.value(self.scale)[0];
         if let Some(parameters) = self.parameters {

@@ -6,6 +6,7 @@ mod account;
 mod clock;
 mod graph;
 mod moments;
+mod scatter;
 mod setup;
 mod spread;
 mod start;
@@ -14,12 +15,11 @@ pub use account::{Disagreement, TargetReport};
 
 use super::{Calibration, Observer, Options, Progress, StageReport};
 use crate::Error;
-use crate::factors::TargetSeen;
 use crate::recording::Recording;
 use crate::rig::{Parent, Rig};
 use graph::{Built, Freedom, State, build};
 use handeye_solvers::manifold::so3;
-use handeye_solvers::{Factor, Loss, Pose, Report as FitReport, Solver, Vector};
+use handeye_solvers::{Loss, Pose, Report as FitReport, Solver};
 use moments::{Stream, chain_of};
 use setup::Setup;
 use start::{Start, starts};
@@ -118,10 +118,11 @@ impl Fitted {
         let rounds = if setup.by_joints { CHAIN_ROUNDS } else { ROUNDS };
         for round in 0..rounds {
             if setup.rig.noise.target.is_none() {
-                state.sigmas = scatter(&setup, &state);
+                scatter::estimate(&setup, &mut state);
             }
             if setup.apart {
                 setup = Setup::new(rig, recording, state.offset)?;
+                state.drifts.resize(setup.views.len(), [0.0; 6]);
                 state.tips = setup.moments.iter().map(|moment| moment.pose.at(state.offset)).collect();
             }
             let mut built = build(&setup, &state, freedom, Loss::Cauchy(TAILS));
@@ -142,7 +143,7 @@ impl Fitted {
         if (self.state.scale - 1.0).abs() < OFF_SCALE {
             return Ok(false);
         }
-        let mut state = State { sigmas: self.state.sigmas, ..fixed.state.clone() };
+        let mut state = State { sigmas: self.state.sigmas, walks: self.state.walks, ..fixed.state.clone() };
         let mut built = build(&fixed.setup, &state, fixed.freedom, Loss::Cauchy(TAILS));
         let (report, _) = built.minimize(&mut state)?;
         Ok(report.final_cost - self.report.final_cost > LOWERS)
@@ -231,34 +232,10 @@ fn first_state(setup: &Setup, start: &Start, offset: f64) -> State {
         offset,
         scale: start.scale,
         sigmas: [rot, rot, rot, xyz, xyz, xyz],
+        walks: [0.0; 2],
+        drifts: vec![[0.0; 6]; setup.views.len()],
         spread: spread::FIRST,
     }
-}
-
-/// A view's residual: rotation [rad], then translation [m].
-fn residual(setup: &Setup, state: &State, index: usize) -> [f64; 6] {
-    let view = &setup.views[index];
-    let (camera, target) = (&setup.rig.cameras[view.camera], &setup.rig.targets[view.target]);
-    let carrier = |parent: Parent| if parent == Parent::World { Pose::identity() } else { state.tips[view.moment] };
-    let on = (
-        carrier(target.parent),
-        state.targets[view.target],
-        carrier(camera.parent),
-        state.cameras[view.camera],
-        Vector::<1>::new(state.scale),
-    );
-    TargetSeen { seen: view.seen }.residual::<f64>(on)
-}
-
-/// Standard deviations of the six numbers over all views, from medians.
-fn scatter(setup: &Setup, state: &State) -> [f64; 6] {
-    let residuals: Vec<[f64; 6]> = (0..setup.views.len()).map(|index| residual(setup, state, index)).collect();
-    std::array::from_fn(|k| {
-        let mut sizes: Vec<f64> = residuals.iter().map(|r| r[k].abs()).collect();
-        sizes.sort_by(f64::total_cmp);
-        // Half of a Gaussian is within 0.6745 standard deviations; not below what arithmetic leaves.
-        (sizes[sizes.len() / 2] / 0.6745).max(1e-9)
-    })
 }
 
 /// The axis that most turns of the tip share, in the tip's frame, and the root mean squares of the turns [rad] about it and about

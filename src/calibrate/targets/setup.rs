@@ -1,10 +1,12 @@
 //! What is known and what was measured, side by side: who carries what, and what the robot read when a target was seen.
 use super::moments::{Moment, Stream};
 use crate::Error;
+use crate::factors::TargetSeen;
 use crate::recording::{Recording, TargetDetection};
 use crate::rig::{Camera, Parent, Rig, Target};
 use handeye_solvers::Pose;
 use nalgebra::{Matrix3, Matrix6};
+use std::collections::BTreeMap;
 
 /// A calibration from targets before anything is estimated.
 pub(super) struct Setup {
@@ -30,6 +32,8 @@ pub(super) struct View {
     pub seen: Pose,
     /// What whitens its residual, where the detector says how good it is.
     pub whitening: Option<[[f64; 6]; 6]>,
+    /// The view before of the same target by the same camera.
+    pub before: Option<usize>,
 }
 
 /// W with WᵀW the inverse covariance of [`TargetSeen`](crate::factors::TargetSeen)'s residual, from that of a reported pose.
@@ -44,6 +48,12 @@ fn whitening(detection: &TargetDetection) -> Option<[[f64; 6]; 6]> {
 }
 
 impl Setup {
+    /// The factor of a view.
+    pub fn seen(&self, index: usize) -> TargetSeen {
+        let view = &self.views[index];
+        TargetSeen { seen: view.seen, camera_stands: self.rig.cameras[view.camera].parent == Parent::World }
+    }
+
     /// Puts rig and recording together, with the images' clock ahead by `offset` [s].
     pub fn new(rig: &Rig, recording: &Recording, offset: f64) -> Result<Setup, Error> {
         let mut rig = rig.clone();
@@ -55,17 +65,20 @@ impl Setup {
             views: Vec::new(),
             rig: Rig::default(),
         };
+        let mut last = BTreeMap::<(usize, usize), usize>::new();
         for (index, sample) in recording.samples.iter().enumerate().filter(|(_, sample)| !sample.targets.is_empty()) {
             let Some(moment) = stream.moment(recording, index, offset) else { continue };
             for detection in &sample.targets {
                 let camera = camera_index(&mut rig, recording, detection.camera as usize);
                 let target = target_index(&mut rig, &detection.target, camera);
+                let before = last.insert((camera, target), setup.views.len());
                 setup.views.push(View {
                     moment: setup.moments.len(),
                     camera,
                     target,
                     seen: detection.pose,
                     whitening: whitening(detection),
+                    before,
                 });
             }
             setup.moments.push(moment);

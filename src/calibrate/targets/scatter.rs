@@ -1,0 +1,107 @@
+//! How far reported targets are from where the model has them, and the noise that this scatter shows: its size, and how far the
+//! reports drift, as those of visual odometry do.
+use super::graph::State;
+use super::setup::Setup;
+use crate::factors::CameraFromTarget;
+use crate::rig::Parent;
+use handeye_solvers::{Factor, Function, Pose, Vector};
+
+/// Gains that are tried: shares of what is new in an error that stay. None: errors of views are independent.
+const GAINS: [f64; 9] = [0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95];
+
+/// Reports count as drifting where that raises the log-likelihood by so much (5 standard deviations), over at least so many views.
+const RAISES: f64 = 12.5;
+const FEWEST: usize = 20;
+
+/// What differs from the error before by more than this [standard deviations] moves a drift no further.
+const CLIPPED: f64 = 3.0;
+
+/// Rotations, then translations.
+const GROUPS: [std::ops::Range<usize>; 2] = [0..3, 3..6];
+
+/// A view's residual without its drift: rotation [rad], then translation [m].
+pub(super) fn residual(setup: &Setup, state: &State, index: usize) -> [f64; 6] {
+    let (predicted, scale) = (predicted(setup, state, index), Vector::<1>::new(state.scale));
+    setup.seen(index).residual::<f64>((predicted, scale, Vector::from(state.drifts[index])))
+}
+
+/// The squared size of a view's residual, in standard deviations.
+pub(super) fn size(setup: &Setup, state: &State, index: usize) -> f64 {
+    let r = residual(setup, state, index);
+    match &setup.views[index].whitening {
+        Some(rows) => rows.iter().map(|row| row.iter().zip(&r).map(|(w, r)| w * r).sum::<f64>().powi(2)).sum(),
+        None => r.iter().zip(state.sigmas).map(|(r, sigma)| (r / sigma).powi(2)).sum(),
+    }
+}
+
+/// Puts the noise into the state that the scatter of the views shows.
+///
+/// The model of an error is white noise on a random walk. Its best prediction from the errors before is their exponential mean, by a
+/// gain K; with σ of what is new against that, the noise is σ √(1 - K) and the walk goes by σ K (Muth 1960). K is the one under
+/// which σ is least, of rotations and of translations each.
+pub(super) fn estimate(setup: &Setup, state: &mut State) {
+    (state.sigmas, state.walks) = noise(setup, state);
+    for (group, _) in GROUPS.into_iter().zip(state.walks).filter(|(_, walk)| *walk == 0.0) {
+        state.drifts.iter_mut().for_each(|drift| drift[group.clone()].fill(0.0));
+    }
+}
+
+/// Standard deviations of the six numbers, and by how much rotations and translations walk.
+fn noise(setup: &Setup, state: &State) -> ([f64; 6], [f64; 2]) {
+    let without = State { drifts: vec![[0.0; 6]; setup.views.len()], ..state.clone() };
+    let errors: Vec<[f64; 6]> = (0..setup.views.len()).map(|index| residual(setup, &without, index)).collect();
+    let independent = deviations(&errors);
+    let (mut sigmas, mut walks) = (independent, [0.0; 2]);
+    let n = setup.views.iter().filter(|view| view.before.is_some() && view.whitening.is_none()).count();
+    if n < FEWEST {
+        return (sigmas, walks);
+    }
+    let most = deviations(&unpredicted(setup, &errors, 1.0, &[f64::INFINITY; 6])).map(|sigma| CLIPPED * sigma);
+    let mut best = [RAISES; 2];
+    for gain in GAINS {
+        let new = deviations(&unpredicted(setup, &errors, gain, &most));
+        for (kind, group) in GROUPS.into_iter().enumerate() {
+            let raised = n as f64 * group.clone().map(|k| (independent[k] / new[k]).ln()).sum::<f64>();
+            if raised > best[kind] {
+                best[kind] = raised;
+                group.clone().for_each(|k| sigmas[k] = new[k] * (1.0 - gain).sqrt());
+                walks[kind] = gain * (group.map(|k| new[k] * new[k]).sum::<f64>() / 3.0).sqrt();
+            }
+        }
+    }
+    (sigmas, walks)
+}
+
+/// What an exponential mean of the errors before does not predict of each error, where nothing new counts for more than `most`.
+fn unpredicted(setup: &Setup, errors: &[[f64; 6]], gain: f64, most: &[f64; 6]) -> Vec<[f64; 6]> {
+    let (mut drifts, mut new) = (vec![[0.0_f64; 6]; errors.len()], Vec::with_capacity(errors.len()));
+    for (index, error) in errors.iter().enumerate() {
+        let drift = setup.views[index].before.map_or([0.0; 6], |before| drifts[before]);
+        let predicted = setup.seen(index).carried(&drift);
+        let fresh: [f64; 6] = std::array::from_fn(|k| error[k] - predicted[k]);
+        let clipped: [f64; 6] = std::array::from_fn(|k| fresh[k].clamp(-most[k], most[k]));
+        let step = setup.seen(index).uncarried(&clipped);
+        drifts[index] = std::array::from_fn(|k| drift[k] + gain * step[k]);
+        new.push(fresh);
+    }
+    new
+}
+
+/// Standard deviations of the six numbers, from medians.
+fn deviations(errors: &[[f64; 6]]) -> [f64; 6] {
+    std::array::from_fn(|k| {
+        let mut sizes: Vec<f64> = errors.iter().map(|r| r[k].abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        // Half of a Gaussian is within 0.6745 standard deviations; not below what arithmetic leaves.
+        (sizes[sizes.len() / 2] / 0.6745).max(1e-9)
+    })
+}
+
+/// `camera_from_target` of a view.
+fn predicted(setup: &Setup, state: &State, index: usize) -> Pose {
+    let view = &setup.views[index];
+    let (camera, target) = (&setup.rig.cameras[view.camera], &setup.rig.targets[view.target]);
+    let carrier = |parent: Parent| if parent == Parent::World { Pose::identity() } else { state.tips[view.moment] };
+    let (carrier, mount) = (carrier(target.parent), carrier(camera.parent));
+    CameraFromTarget.compute::<f64>((carrier, state.targets[view.target], mount, state.cameras[view.camera]))
+}
