@@ -18,7 +18,7 @@ pub(in crate::experiments) const TABLE5_1: Experiment = Experiment {
 
 pub(in crate::experiments) const TABLE5_2: Experiment = Experiment {
     name: "table5.2",
-    about: "the same with perfect trackers",
+    about: "servoing without a rig, cameras carried around the target, perfect trackers",
     source: "Ramirez 2016, table 5.2",
     run: |options| run(options, Tracker::Perfect, &PERFECT),
     ..TABLE5_1
@@ -26,7 +26,7 @@ pub(in crate::experiments) const TABLE5_2: Experiment = Experiment {
 
 pub(in crate::experiments) const TABLE5_3: Experiment = Experiment {
     name: "table5.3",
-    about: "the same with noise of 0.2 px",
+    about: "servoing without a rig, cameras carried around the target, trackers with noise of 0.2 px",
     source: "Ramirez 2016, table 5.3",
     is_seeded: true,
     run: |options| run(options, Tracker::Gaussian(0.2), &GAUSSIAN),
