@@ -60,6 +60,7 @@ impl PeerProblem {
             convention: Convention::Dh,
             kinds: vec![JointKind::Revolute; n],
             reversed: vec![false; n],
+            frames: None,
         });
         let base = graph.free(self.base);
         let rows = DynamicVector::from_iterator(5 * n, self.dh.iter().flat_map(|row| row.iter().copied().chain([0.0])));

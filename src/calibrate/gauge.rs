@@ -5,10 +5,9 @@
 //! decides these, a rule does: values that would be redundant are held. Points of depth cameras decide the scale.
 use super::deviations::{coordinate_of, intrinsics_of};
 use super::graph::{Freedom, Priors, State, row};
-use super::kinematics::PARALLEL;
 use super::observation::Kind;
 use super::setup::Setup;
-use crate::chain::{Convention, JointKind, LINK_PARAMETERS};
+use crate::chain::{Convention, JointKind, LINK_PARAMETERS, PARALLEL};
 use crate::rig::{JointField, Parameter, Parent};
 use handeye_solvers::Pose;
 

@@ -141,6 +141,11 @@ fn forget(rig: &mut Rig, recording: &Recording, free: &[String]) {
             parameter => rig.forget(&parameter),
         }
     }
+    if chain {
+        // Links' own frames stood against the rows that are forgotten.
+        rig.robot.start = None;
+        rig.robot.joints.iter_mut().for_each(|joint| joint.frame = None);
+    }
 }
 
 /// What is held must be complete: what a rig lacks is not learned on the side, but for cameras and features that are new.

@@ -2,7 +2,8 @@
 //!
 //! For link i with A = base · L₁ ⋯ Lᵢ₋₁ before it, a parameter that turns Lᵢ by w and moves it by v (both in the frame
 //! of link i - 1: dR = [w] R, dt = v) turns the last link by R_A w in the world and moves its origin by
-//! R_A v + (R_A w) × (t - tᵢ), with tᵢ and t the origins of link i and of the last link in the world.
+//! R_A v + (R_A w) × (t - tᵢ), with tᵢ the origin of row i's frame and t that of the last link, in the world. Links with
+//! frames of their own differ from their rows' by a constant, which changes t alone.
 use super::{Chain, JointKind, LINK_PARAMETERS};
 use handeye_solvers::scalar::{Dual, derivatives, seed};
 use handeye_solvers::{Pose, Scalar};
@@ -24,7 +25,7 @@ pub struct ChainJacobian {
     pub parameters: Vec<Column>,
     /// By the joints' readings; 0 beyond the link.
     pub joints: Vec<Column>,
-    /// Origin of each link in the world.
+    /// Origin in the world of the frame that each row makes.
     origins: Vec<Vector3<f64>>,
 }
 
@@ -42,7 +43,11 @@ impl Chain {
         jacobian: &mut ChainJacobian,
     ) -> Pose {
         jacobian.clear(self.len());
-        let mut pose = *world_from_base;
+        let Some(last) = upto.checked_sub(1) else {
+            jacobian.of_base(world_from_base, world_from_base);
+            return *world_from_base;
+        };
+        let mut pose = self.start(world_from_base);
         for (i, &joint) in joints.iter().enumerate().take(upto) {
             let at = LINK_PARAMETERS * i;
             let dual = std::array::from_fn(|k| seed::<LINK_PARAMETERS>(parameters[at + k], k));
@@ -55,9 +60,9 @@ impl Chain {
             pose = pose * value;
             jacobian.origins[i] = pose.translation;
         }
-        let tip = pose.translation;
+        let link = self.own_frame(last, pose);
         for i in 0..upto {
-            let lever = tip - jacobian.origins[i];
+            let lever = link.translation - jacobian.origins[i];
             let at = LINK_PARAMETERS * i;
             for column in &mut jacobian.parameters[at..at + LINK_PARAMETERS] {
                 let moved = Vector3::new(column[0], column[1], column[2]).cross(&lever);
@@ -67,12 +72,8 @@ impl Chain {
             let added_to = if self.kinds[i] == JointKind::Revolute { 0 } else { 1 };
             jacobian.joints[i] = jacobian.parameters[at + added_to].map(|v| self.sign(i) * v);
         }
-        for k in 0..3 {
-            let axis = Vector3::ith(k, 1.0);
-            jacobian.base[k] = stack(axis, axis.cross(&(tip - world_from_base.translation)));
-            jacobian.base[3 + k] = stack(Vector3::zeros(), axis);
-        }
-        pose
+        jacobian.of_base(world_from_base, &link);
+        link
     }
 }
 
@@ -83,6 +84,14 @@ impl ChainJacobian {
         self.joints.clear();
         self.joints.resize(n_joints, [0.0; 6]);
         self.origins.resize(n_joints, Vector3::zeros());
+    }
+
+    fn of_base(&mut self, base: &Pose, link: &Pose) {
+        for k in 0..3 {
+            let axis = Vector3::ith(k, 1.0);
+            self.base[k] = stack(axis, axis.cross(&(link.translation - base.translation)));
+            self.base[3 + k] = stack(Vector3::zeros(), axis);
+        }
     }
 }
 
@@ -110,6 +119,7 @@ fn stack(w: Vector3<f64>, v: Vector3<f64>) -> Column {
 mod tests {
     use super::*;
     use crate::chain::Convention;
+    use crate::chain::frames::tests::frames;
     use handeye_solvers::Variable;
 
     /// Central difference of a pose, in its own step.
@@ -136,11 +146,13 @@ mod tests {
         let parameters: Vec<f64> = (0..25).map(|i| (f64::from(i) * 1.7).sin()).collect();
         let joints = [0.4, -0.9, 0.3, 1.4, -0.2];
         let mut jacobian = ChainJacobian::default();
-        for &convention in Convention::ALL {
+        let chains = Convention::ALL.iter().flat_map(|&convention| [(convention, None), (convention, Some(frames(5)))]);
+        for (convention, frames) in chains {
             let chain = Chain {
                 convention,
                 kinds: vec![Revolute, Prismatic, Revolute, Revolute, Prismatic],
                 reversed: vec![false, false, true, false, true],
+                frames,
             };
             for upto in 0..=chain.len() {
                 let pose = |base: &Pose, parameters: &[f64], joints: &[f64]| match upto {

@@ -1,5 +1,5 @@
 //! A chain of which only the joints move: link poses and the geometric Jacobian, fast enough for control loops.
-use super::{Chain, Convention, JointKind, LINK_PARAMETERS};
+use super::{Chain, Convention, Frames, JointKind, LINK_PARAMETERS};
 use handeye_solvers::Pose;
 use handeye_solvers::manifold::so3;
 use nalgebra::{Matrix3, Vector3};
@@ -9,12 +9,16 @@ use nalgebra::{Matrix3, Vector3};
 ///   world_from_link_i = B · ∏_{k ≤ i} Rz(ω_k) Tz(d_k) F_k      (standard)
 ///   world_from_link_i = B · ∏_{k ≤ i} F_k Rz(ω_k) Tz(d_k)      (modified)
 ///
-/// F holds what no joint moves, a, alpha and beta, and is computed here; a joint's reading is part of ω or d.
+/// F holds what no joint moves, a, alpha and beta, and is computed here; a joint's reading is part of ω or d. Frames that the
+/// links have of their own follow the products.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointChain {
     base: Pose,
+    /// Where the first row begins, in the world.
+    start: Pose,
     convention: Convention,
     joints: Vec<Joint>,
+    frames: Option<Frames>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,7 +73,8 @@ impl JointChain {
             Joint { kind: chain.kinds[i], sign: chain.sign(i), offset, d, fixed: held }
         };
         let joints = parameters.chunks_exact(LINK_PARAMETERS).take(chain.len()).enumerate().map(joint).collect();
-        JointChain { base: *world_from_base, convention: chain.convention, joints }
+        let (start, frames) = (chain.start(world_from_base), chain.frames.clone());
+        JointChain { base: *world_from_base, start, convention: chain.convention, joints, frames }
     }
 
     /// Number of joints.
@@ -89,14 +94,17 @@ impl JointChain {
 
     /// `world_from_tip`. `joints`: one reading per joint [rad or m].
     pub fn tip(&self, joints: &[f64]) -> Pose {
-        let mut pose = self.base;
+        let mut pose = if self.is_empty() { self.base } else { self.start };
         for (joint, &reading) in self.joints.iter().zip(joints) {
             pose = match self.convention {
                 Convention::Dh => times(&joint.moved(pose, reading), &joint.fixed),
                 Convention::ModifiedDh => joint.moved(times(&pose, &joint.fixed), reading),
             };
         }
-        pose
+        match self.frames.as_ref().and_then(|frames| frames.links.last()) {
+            Some(frame) => times(&pose, frame),
+            None => pose,
+        }
     }
 
     /// Poses of all links and axes of all joints. `joints`: one reading per joint [rad or m].
@@ -104,7 +112,7 @@ impl JointChain {
         posture.links.resize(self.joints.len() + 1, self.base);
         posture.axes.resize(self.joints.len(), Axis::default());
         posture.links[0] = self.base;
-        let mut pose = self.base;
+        let mut pose = self.start;
         let places = posture.links[1..].iter_mut().zip(&mut posture.axes);
         for ((joint, &reading), (link, axis)) in self.joints.iter().zip(joints).zip(places) {
             let before = match self.convention {
@@ -122,6 +130,9 @@ impl JointChain {
                 Convention::ModifiedDh => moved,
             };
             *link = pose;
+        }
+        if let Some(frames) = &self.frames {
+            posture.links[1..].iter_mut().zip(&frames.links).for_each(|(link, frame)| *link = times(link, frame));
         }
     }
 }
@@ -181,6 +192,7 @@ fn times(a: &Pose, b: &Pose) -> Pose {
 mod tests {
     use super::*;
     use crate::chain::ChainJacobian;
+    use crate::chain::frames::tests::frames;
 
     #[test]
     fn poses_and_derivatives_are_those_of_the_whole_chain() {
@@ -188,11 +200,13 @@ mod tests {
         let base = Pose::new(Vector3::new(0.3, -0.8, 0.4), Vector3::new(0.5, -1.0, 0.2));
         let parameters: Vec<f64> = (0..25).map(|i| (f64::from(i) * 1.7).sin()).collect();
         let joints = [0.4, -0.9, 0.3, 1.4, -0.2];
-        for &convention in Convention::ALL {
+        let chains = Convention::ALL.iter().flat_map(|&convention| [(convention, None), (convention, Some(frames(5)))]);
+        for (convention, frames) in chains {
             let chain = Chain {
                 convention,
                 kinds: vec![Revolute, Prismatic, Revolute, Revolute, Prismatic],
                 reversed: vec![false, false, true, false, true],
+                frames,
             };
             let (prepared, mut posture) = (JointChain::new(&chain, &base, &parameters), Posture::default());
             prepared.posture(&joints, &mut posture);

@@ -2,15 +2,21 @@
 use handeye_solvers::{Pose, Scalar};
 
 mod dh;
+mod frames;
 mod jacobian;
 mod joint_chain;
 mod modified_dh;
 
+pub use frames::Frames;
 pub use jacobian::ChainJacobian;
 pub use joint_chain::{Axis, JointChain, Posture};
 
 /// Numbers of a link: offset [rad], d [m], a [m], alpha [rad], beta [rad].
 pub const LINK_PARAMETERS: usize = 5;
+
+/// Sine of the angle between two axes below which they count as parallel [about 11°]: their common normal is ill-defined,
+/// and Hayati's beta describes the second in place of d.
+pub(crate) const PARALLEL: f64 = 0.2;
 
 /// How a row of parameters makes a link.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -90,6 +96,8 @@ pub struct Chain {
     pub kinds: Vec<JointKind>,
     /// True where a joint's reading counts against its axis; as long as `kinds`.
     pub reversed: Vec<bool>,
+    /// Where the links have frames of their own; `None` where the frames that the rows make are the links'.
+    pub frames: Option<Frames>,
 }
 
 impl Chain {
@@ -107,22 +115,29 @@ impl Chain {
     ///
     /// `parameters`: five per joint. `joints`: one reading per joint [rad or m].
     pub fn links(&self, world_from_base: &Pose, parameters: &[f64], joints: &[f64]) -> Vec<Pose> {
-        let mut world_from_link = *world_from_base;
+        let mut world_from_row = self.start(world_from_base);
         let next = |i| {
-            world_from_link = world_from_link * self.link(i, parameters, joints);
-            world_from_link
+            world_from_row = world_from_row * self.row(i, parameters, joints);
+            self.own_frame(i, world_from_row)
         };
         (0..self.len()).map(next).collect()
     }
 
     /// Pose of the last link in the world, `world_from_tip`: the last of [`Chain::links`], without allocating.
     pub fn tip(&self, world_from_base: &Pose, parameters: &[f64], joints: &[f64]) -> Pose {
-        (0..self.len()).fold(*world_from_base, |pose, i| pose * self.link(i, parameters, joints))
+        self.upto(self.len(), world_from_base, parameters, joints)
     }
 
-    /// Pose of link `i` in the one before.
+    /// Pose in the world of the link after `upto` joints: 0 for the base.
+    pub(crate) fn upto(&self, upto: usize, world_from_base: &Pose, parameters: &[f64], joints: &[f64]) -> Pose {
+        let Some(last) = upto.checked_sub(1) else { return *world_from_base };
+        let rows = (0..upto).fold(self.start(world_from_base), |pose, i| pose * self.row(i, parameters, joints));
+        self.own_frame(last, rows)
+    }
+
+    /// Pose of the frame that row `i` makes in the one before.
     #[inline]
-    pub(crate) fn link(&self, i: usize, parameters: &[f64], joints: &[f64]) -> Pose {
+    fn row(&self, i: usize, parameters: &[f64], joints: &[f64]) -> Pose {
         let at = LINK_PARAMETERS * i;
         let row = std::array::from_fn(|k| parameters[at + k]);
         self.convention.link(self.kinds[i], &row, self.sign(i) * joints[i])
@@ -155,7 +170,12 @@ mod tests {
         let a = [0.0, -0.425, -0.39225, 0.0, 0.0, 0.0];
         let alpha = [quarter, 0.0, 0.0, quarter, -quarter, 0.0];
         let parameters: Vec<f64> = (0..6).flat_map(|i| [0.0, d[i], a[i], alpha[i], 0.0]).collect();
-        let chain = Chain { convention: Convention::Dh, kinds: vec![JointKind::Revolute; 6], reversed: vec![false; 6] };
+        let chain = Chain {
+            convention: Convention::Dh,
+            kinds: vec![JointKind::Revolute; 6],
+            reversed: vec![false; 6],
+            frames: None,
+        };
         let tip = chain.tip(&Pose::identity(), &parameters, &[0.0; 6]);
         let expected = Vector3::new(-0.425 - 0.39225, -0.10915 - 0.0823, 0.089159 - 0.09465);
         assert!((tip.translation - expected).norm() < 1e-12);
@@ -167,7 +187,7 @@ mod tests {
         let parameters = [0.3, 0.1, 0.2, -0.4, 0.05];
         for &convention in Convention::ALL {
             for kind in [JointKind::Revolute, JointKind::Prismatic] {
-                let chain = |reversed| Chain { convention, kinds: vec![kind], reversed: vec![reversed] };
+                let chain = |reversed| Chain { convention, kinds: vec![kind], reversed: vec![reversed], frames: None };
                 let base = Pose::new(Vector3::new(0.1, 0.2, 0.3), Vector3::new(1.0, 2.0, 3.0));
                 assert_eq!(chain(true).tip(&base, &parameters, &[0.7]), chain(false).tip(&base, &parameters, &[-0.7]));
             }

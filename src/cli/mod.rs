@@ -7,6 +7,7 @@ mod counts;
 mod demo;
 mod evaluate;
 mod experiment;
+mod export;
 mod folds;
 mod infer;
 mod inputs;
@@ -65,6 +66,7 @@ enum Command {
     Suggest(suggest::Suggest),
     Servo(servo::Servo),
     Experiment(experiment::ExperimentCommand),
+    Export(export::Export),
     Completions(completions::Completions),
 }
 
@@ -89,6 +91,7 @@ impl Cli {
             Command::Suggest(suggest) => suggest.run(),
             Command::Servo(servo) => servo.run(self.json),
             Command::Experiment(experiment) => experiment.run(),
+            Command::Export(export) => export.run(),
             Command::Completions(completions) => completions.run(),
         }
     }

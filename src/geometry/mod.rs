@@ -8,6 +8,7 @@ mod essential;
 mod five_point;
 mod hand_eye;
 mod object_space;
+pub(crate) mod orientation;
 mod perspective_n_point;
 mod polynomial;
 mod ransac;

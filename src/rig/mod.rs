@@ -5,7 +5,6 @@ mod names;
 mod paths;
 pub(crate) mod read;
 mod replace;
-pub(crate) mod rotations;
 mod types;
 mod write;
 
@@ -13,5 +12,6 @@ pub use model::{Model, ModelCamera, ModelFeature};
 pub(crate) use names::{problem_of_joint_name, problem_of_name};
 pub use paths::{CameraField, JointField, Parameter, matches};
 pub(crate) use read::problem_of_distortion;
-pub(crate) use replace::replace_file;
+pub use read::read_text;
+pub use replace::replace_file;
 pub use types::*;

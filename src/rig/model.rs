@@ -1,15 +1,15 @@
 //! A complete rig as numbers: the generative model, joints -> poses -> 3D features -> pixels.
-use super::{Parent, Rig};
+use super::{Parent, Rig, Robot};
 use crate::Error;
 use crate::camera::{CameraModel, PARAMETERS};
-use crate::chain::{Chain, JointChain, LINK_PARAMETERS};
+use crate::chain::{Chain, Frames, JointChain, LINK_PARAMETERS};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
 
 /// Everything needed to predict pixels. Indices of cameras and features are those of the rig it was made from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
-    /// Convention and kinds of the joints.
+    /// Convention and kinds of the joints, and the frames of the links.
     pub chain: Chain,
     /// `world_from_base`.
     pub base: Pose,
@@ -143,12 +143,17 @@ impl Model {
 }
 
 impl Rig {
-    /// Convention and kinds of the joints.
+    /// Convention and kinds of the joints, and the frames of the links.
     pub fn chain(&self) -> Chain {
+        let Robot { convention, start, joints, .. } = &self.robot;
+        let own = start.is_some() || joints.iter().any(|joint| joint.frame.is_some());
+        let pose = |pose: &Option<Pose>| pose.unwrap_or_else(Pose::identity);
+        let frames = || Frames { start: pose(start), links: joints.iter().map(|joint| pose(&joint.frame)).collect() };
         Chain {
-            convention: self.robot.convention,
-            kinds: self.robot.joints.iter().map(|joint| joint.kind).collect(),
-            reversed: self.robot.joints.iter().map(|joint| joint.reversed).collect(),
+            convention: *convention,
+            kinds: joints.iter().map(|joint| joint.kind).collect(),
+            reversed: joints.iter().map(|joint| joint.reversed).collect(),
+            frames: own.then(frames),
         }
     }
 }

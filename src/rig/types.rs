@@ -32,6 +32,10 @@ pub struct Robot {
     pub convention: Convention,
     /// `world_from_base`.
     pub base: Option<Pose>,
+    /// What the base is called in a URDF.
+    pub link: Option<String>,
+    /// `base_from_start`, where the first row begins; `None` where that is the base.
+    pub start: Option<Pose>,
     /// The joints, from base to tip.
     pub joints: Vec<Joint>,
 }
@@ -57,6 +61,10 @@ pub struct Joint {
     pub reversed: bool,
     /// How far and how fast it may move.
     pub limits: Limits,
+    /// What its link is called in a URDF.
+    pub link: Option<String>,
+    /// `row_from_link`, the link's own frame in that which the row makes; `None` where they are the same.
+    pub frame: Option<Pose>,
 }
 
 /// Limits of a joint [rad, rad/s, rad/s², or m in place of rad]; `None` is unlimited or unknown.

@@ -3,7 +3,7 @@ mod lists;
 mod parts;
 mod values;
 
-use super::read::read_text;
+use super::read::{parse, read_text};
 use super::replace::replace_file;
 use super::{Estimate, Fit, Joint, Rig, Robot};
 use crate::Error;
@@ -38,7 +38,7 @@ impl Rig {
     /// Errors: where `original` is no rig file.
     pub fn update_toml(&self, original: &str) -> Result<String, Error> {
         let name = "the rig file to update";
-        let before = Rig::parse(original, name)?;
+        let before = parse(original, name, Some(self))?;
         let mut document: DocumentMut = original
             .parse()
             .map_err(|error: toml_edit::TomlError| Error::at(name, original, 0, error.message().to_owned()))?;
@@ -67,7 +67,8 @@ fn write_rig(document: &mut DocumentMut, before: Option<&Rig>, now: &Rig) {
     let name = |name: &String| Value::from(name.as_str());
     Writer { table: document.as_table_mut(), fresh }.put("name", &before.name, &now.name, name);
 
-    if fresh || before.robot != now.robot {
+    let is_urdf = document.get("robot").is_some_and(|robot| robot.get("urdf").is_some());
+    if fresh || is_urdf || before.robot != now.robot {
         in_section(document, "robot", "", |table| write_robot(table, fresh, &before.robot, &now.robot));
     }
     let joints = (before.robot.joints.as_slice(), now.robot.joints.as_slice());
@@ -114,9 +115,16 @@ fn write_rig(document: &mut DocumentMut, before: Option<&Rig>, now: &Rig) {
 }
 
 fn write_robot(table: &mut dyn TableLike, fresh: bool, before: &Robot, now: &Robot) {
-    let mut writer = Writer { table, fresh };
+    let is_urdf = table.contains_key("urdf");
+    if is_urdf {
+        // Rows, which say what was learned, take its place.
+        ["urdf", "base", "tip", "pose"].iter().for_each(|key| drop(table.remove(key)));
+    }
+    let mut writer = Writer { table, fresh: fresh || is_urdf };
     writer.put_default("convention", before.convention, now.convention, |convention| Value::from(convention.name()));
     writer.put_pose("base", &before.base, &now.base);
+    writer.put("link", &before.link, &now.link, |link| Value::from(link.as_str()));
+    writer.put_pose("start", &before.start, &now.start);
     let names: Vec<&str> = now.joints.iter().map(|joint| joint.name.as_str()).collect();
     let is_new = write_list(table, "joints", &names, |table, index, existed| {
         let joint: &Joint = &now.joints[index];

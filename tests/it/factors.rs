@@ -82,7 +82,7 @@ fn what_robots_read_and_do_has_the_derivatives_of_differences() {
         check::factor(&JointAction { joint: 1, action: 0.2 }, &(joints.clone(), next)).unwrap();
         for convention in [Convention::Dh, Convention::ModifiedDh] {
             let kinds = vec![JointKind::Revolute, JointKind::Prismatic, JointKind::Revolute, JointKind::Revolute];
-            let chain = Arc::new(Chain { convention, kinds, reversed: vec![false, true, true, false] });
+            let chain = Arc::new(Chain { convention, kinds, reversed: vec![false, true, true, false], frames: None });
             for upto in 0..=4 {
                 let function = ForwardKinematics { chain: chain.clone(), upto };
                 check::function(&function, &(place.pose(), place.numbers(20), joints.clone())).unwrap();

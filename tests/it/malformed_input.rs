@@ -2,11 +2,12 @@
 use handeye::Error;
 use handeye::recording::Recording;
 use handeye::rig::{Rig, catalog};
+use handeye::urdf::Urdf;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// A text in which the character after `@` is where the problem stands.
-fn place(marked: &str) -> (String, usize, usize) {
+pub fn place(marked: &str) -> (String, usize, usize) {
     let (before, after) = marked.split_once('@').expect("a marked place");
     let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
     let column = 1 + before[line_start..].chars().count();
@@ -65,7 +66,7 @@ fn every_mistake_in_a_rig_file_is_told_with_its_place_and_what_would_do() {
         ("[[robot.joints]]\nname = 'j'\n@ofset = 1\n", "joint `j`: unknown key `ofset` (did you mean `offset`?)"),
         (
             "[[robot.joints]]\nname = 'j'\n@theta = 1\n",
-            "(known: name, type, offset, d, a, alpha, beta, reversed, limits)",
+            "(known: name, type, offset, d, a, alpha, beta, reversed, limits, link, frame)",
         ),
         ("[[@camera]]\nname = 'c'\n", "unknown key `camera` (did you mean `cameras`?)"),
         ("[[robot.joints]]\nname = 'j'\nlimits = { @max = 1 }\n", "(known: lower, upper, velocity, acceleration)"),
@@ -76,7 +77,6 @@ fn every_mistake_in_a_rig_file_is_told_with_its_place_and_what_would_do() {
         ),
         ("[robot]\nconvention = @'craig'\n", "unknown convention `craig` (known: dh, modified-dh)"),
         ("[[robot.joints]]\nname = 'j'\ntype = @'fixed'\n", "unknown joint type `fixed` (known: revolute, prismatic)"),
-        ("[robot]\nurdf = @'ur5.urdf'\ntip = 'tool0'\n", "Denavit-Hartenberg rows"),
         // Names and parents.
         ("@[[robot.joints]]\nd = 1\n", "joint 1: has no `name`"),
         ("[[robot.joints]]\nname = 'a'\n[[robot.joints]]\nname = @'a'\n", "another joint is called `a`, in line 2"),
@@ -282,7 +282,11 @@ fn mutate(bytes: &mut Vec<u8>, random: &mut ChaCha8Rng) {
 }
 
 /// Reads mutations; returns how many were fine and how many were refused. A refusal has a place inside the text.
-fn mutations<T>(seeds: &[Vec<u8>], count: usize, read: impl Fn(&[u8]) -> Option<Result<T, Error>>) -> (usize, usize) {
+pub fn mutations<T>(
+    seeds: &[Vec<u8>],
+    count: usize,
+    read: impl Fn(&[u8]) -> Option<Result<T, Error>>,
+) -> (usize, usize) {
     let mut random = ChaCha8Rng::seed_from_u64(7);
     let (mut fine, mut refused) = (0, 0);
     for round in 0..count {
@@ -360,4 +364,41 @@ fn no_damage_to_a_recording_goes_without_a_place_or_brings_the_program_down() {
         Some(recording)
     });
     assert!(fine > 100 && refused > 5000, "{fine} fine and {refused} refused: the damage tests little");
+}
+
+#[test]
+fn no_damage_to_a_urdf_goes_without_a_place_or_brings_the_program_down() {
+    let seeds = [crate::urdf::ARM.as_bytes().to_vec()];
+    let (fine, refused) = mutations(&seeds, 10_000, |bytes| {
+        let text = std::str::from_utf8(bytes).ok()?;
+        let urdf = match Urdf::parse(text, "file") {
+            Ok(urdf) => urdf,
+            Err(error) => return Some(Err(error)),
+        };
+        let arm = urdf.arm("base_link", "tool0");
+        if let Ok(arm) = &arm {
+            let rig = Rig { robot: arm.clone().into(), ..Rig::default() };
+            // A number far out of any arm's range need not come through.
+            if let Err(error) = handeye::export::to_urdf(&rig, text, "file") {
+                assert!(matches!(error, Error::Unusable(_)), "{error}");
+            }
+        }
+        match arm {
+            // The links are whole, and no arm: nothing of the text is wrong by itself.
+            Err(Error::Unusable(_)) => None,
+            arm => Some(arm),
+        }
+    });
+    assert!(fine > 500 && refused > 1500, "{fine} fine and {refused} refused: the damage tests little");
+}
+
+#[test]
+fn deeply_nested_xml_brings_nothing_down() {
+    for text in
+        ["<robot>".repeat(100_000), format!("<robot>{}", "<link name='a'>".repeat(100_000)), "<!--".repeat(100_000)]
+    {
+        assert!(matches!(Urdf::parse(&text, "deep"), Err(Error::Malformed { .. })));
+    }
+    let text = format!("{}{}", "<robot>".repeat(50_000), "</robot>".repeat(50_000));
+    let _ = Urdf::parse(&text, "deep");
 }

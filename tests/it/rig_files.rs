@@ -36,6 +36,8 @@ fn random_rig(seed: u64) -> Rig {
         Rig { name: maybe(random, |r| format!("rig \"{}\" ü\\\n#", r.random_range(0..9))), ..Rig::default() };
     rig.robot.convention = Convention::ALL[random.random_range(0..Convention::ALL.len())];
     rig.robot.base = maybe(random, random_pose);
+    rig.robot.start = maybe(random, random_pose);
+    rig.robot.link = maybe(random, |_| "base_link".to_owned());
     for index in 0..random.random_range(0..8) {
         let lower = maybe(random, random_number);
         rig.robot.joints.push(Joint {
@@ -53,7 +55,13 @@ fn random_rig(seed: u64) -> Rig {
                 velocity: maybe(random, |r| r.random_range(0.1..3.0)),
                 acceleration: maybe(random, |r| r.random_range(0.1..30.0)),
             },
+            link: maybe(random, |r| format!("link {}", r.random_range(0..9))),
+            frame: None,
         });
+        let joint = rig.robot.joints.last_mut().unwrap();
+        if [joint.offset, joint.d, joint.a, joint.alpha].iter().all(Option::is_some) {
+            joint.frame = maybe(random, random_pose);
+        }
     }
     let n_joints = rig.robot.joints.len();
     let parent = |random: &mut ChaCha8Rng| match random.random_range(0..3) {
@@ -148,7 +156,8 @@ fn assert_same(found: &Rig, expected: &Rig, what: &str) {
 fn poses(rig: &mut Rig) -> Vec<&mut Option<Pose>> {
     let cameras = rig.cameras.iter_mut().map(|camera| &mut camera.pose);
     let targets = rig.targets.iter_mut().map(|target| &mut target.pose);
-    std::iter::once(&mut rig.robot.base).chain(cameras).chain(targets).collect()
+    let frames = rig.robot.joints.iter_mut().map(|joint| &mut joint.frame);
+    [&mut rig.robot.base, &mut rig.robot.start].into_iter().chain(frames).chain(cameras).chain(targets).collect()
 }
 
 #[test]

@@ -9,4 +9,4 @@ mod rows;
 
 pub(crate) use axes::{Axes, find_axes};
 pub(crate) use lines::{Lines, find_lines};
-pub(crate) use rows::{PARALLEL, rows};
+pub(crate) use rows::rows;

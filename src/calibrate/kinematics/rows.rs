@@ -1,12 +1,8 @@
 //! Rows of a chain's convention from the lines of its axes.
 use super::Lines;
-use crate::chain::{Convention, JointKind, LINK_PARAMETERS};
+use crate::chain::{Convention, JointKind, LINK_PARAMETERS, PARALLEL};
 use handeye_solvers::Pose;
 use nalgebra::{Matrix3, Vector3};
-
-/// Sine of the angle between two axes below which they count as parallel [about 11°]: their common normal is ill-defined,
-/// and Hayati's beta describes the second in place of d.
-pub(crate) const PARALLEL: f64 = 0.2;
 
 /// `world_from_base`, and offset, d, a, alpha, beta of every joint, whose chain moves as the lines do.
 ///
@@ -117,7 +113,7 @@ mod tests {
                 parameters.extend([rng.random_range(-3.0..3.0), rng.random_range(-0.4..0.4), a, alpha, beta]);
             }
             let kinds = vec![JointKind::Revolute; n];
-            let chain = |convention| Chain { convention, kinds: kinds.clone(), reversed: vec![false; n] };
+            let chain = |convention| Chain { convention, kinds: kinds.clone(), reversed: vec![false; n], frames: None };
             let truth = chain(Convention::Dh);
             let base = Pose::new(Vector3::new(0.3, -0.4, 0.9), Vector3::new(1.0, 0.2, -0.5));
             let links: Vec<Pose> =

@@ -1,6 +1,6 @@
 //! A pose in a recording: `{"xyz":[x,y,z],"quat":[x,y,z,w]}`, or with `"rpy"` in place of `"quat"`.
 use super::entries::{Entries, Keys, Numbers, Object};
-use crate::rig::rotations;
+use crate::geometry::orientation;
 use handeye_solvers::Pose;
 use nalgebra::{Matrix3, Matrix6, Vector3};
 use serde::de::MapAccess;
@@ -69,10 +69,10 @@ impl Entries for PoseEntries {
         match key {
             "xyz" => self.xyz = map.next_value_seed(Numbers(Ok))?,
             "covariance" => self.covariance = map.next_value_seed(Numbers(covariance))?,
-            "rpy" => self.rotation = map.next_value_seed(Numbers(|rpy| Ok(Some(rotations::from_rpy(rpy)))))?,
+            "rpy" => self.rotation = map.next_value_seed(Numbers(|rpy| Ok(Some(orientation::from_rpy(rpy)))))?,
             _ => {
                 self.rotation = map.next_value_seed(Numbers(|quat| {
-                    let rotation = rotations::from_quaternion(quat);
+                    let rotation = orientation::from_quaternion(quat);
                     rotation.map(Some).ok_or_else(|| {
                         "a quaternion of length 0 is no rotation (none is [0,0,0,1]; what was not measured is left out)".to_owned()
                     })

@@ -1,8 +1,9 @@
 //! Writing recordings: keys in the order of the format, floats in their shortest form.
 use super::header::{FORMAT, VERSION};
 use crate::Error;
+use crate::geometry::orientation;
 use crate::recording::{RecordedCamera, Recording, Sample};
-use crate::rig::{replace_file, rotations};
+use crate::rig::replace_file;
 use handeye_solvers::Pose;
 use nalgebra::Matrix6;
 use std::io::{self, Write};
@@ -159,7 +160,7 @@ fn write_pose(line: &mut String, pose: &Pose) -> io::Result<()> {
 fn write_pose_with(line: &mut String, pose: &Pose, covariance: Option<&Matrix6<f64>>) -> io::Result<()> {
     let mut object = Members::begin(line);
     numbers(object.member("xyz")?, pose.translation.as_slice())?;
-    numbers(object.member("quat")?, &rotations::to_quaternion(&pose.rotation))?;
+    numbers(object.member("quat")?, &orientation::to_quaternion(&pose.rotation))?;
     if let Some(covariance) = covariance {
         // Symmetric, so that columns are rows.
         numbers(object.member("covariance")?, covariance.as_slice())?;

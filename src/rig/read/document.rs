@@ -1,6 +1,8 @@
 //! A TOML text with its places: every value knows where it stands, so that what is wrong with it can say where.
+use super::read_text;
 use crate::Error;
 use crate::error::suggestion;
+use std::path::Path;
 use toml_edit::{ArrayOfTables, Document, Item, TableLike, Value};
 
 /// The text and what the user calls it.
@@ -133,6 +135,23 @@ impl<'a> Node<'a> {
         match self.content {
             Content::Value(Value::String(text)) => Ok(text.value()),
             _ => Err(self.unexpected("a string")),
+        }
+    }
+
+    /// Name and text of a file that a string names, relative to this one.
+    pub(super) fn text_of_file(&self) -> Result<(String, String), Error> {
+        let folder = Path::new(self.source.file).parent().unwrap_or(Path::new(""));
+        let path = folder.join(self.text()?);
+        // Devices and pipes need not end.
+        let text = if path.exists() && !path.is_file() {
+            Err(Error::io(&path, std::io::ErrorKind::InvalidInput.into()))
+        } else {
+            read_text(&path)
+        };
+        match text {
+            Ok(text) => Ok((path.display().to_string(), text)),
+            Err(error @ Error::Io { .. }) => Err(self.error(error)),
+            Err(error) => Err(error),
         }
     }
 

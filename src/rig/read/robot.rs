@@ -2,20 +2,25 @@
 use super::document::{Fields, Node};
 use super::named::read_named;
 use super::pose::read_pose;
+use super::urdf::read_urdf;
 use crate::Error;
 use crate::chain::{Convention, JointKind};
 use crate::rig::names::problem_of_joint_name;
 use crate::rig::{Joint, Limits, Robot};
 
-const JOINT_KEYS: &[&str] = &["name", "type", "offset", "d", "a", "alpha", "beta", "reversed", "limits"];
+const ROBOT_KEYS: &[&str] = &["convention", "base", "start", "link", "joints", "urdf", "tip", "pose"];
+const JOINT_KEYS: &[&str] =
+    &["name", "type", "offset", "d", "a", "alpha", "beta", "reversed", "limits", "link", "frame"];
 
-pub(super) fn read_robot(node: Node) -> Result<Robot, Error> {
-    let fields = node.table(&["convention", "base", "joints", "urdf", "tip"])?.labelled("robot");
-    for key in ["urdf", "tip"] {
+/// `taken`: the robot where it was made of a URDF already, which is not read again.
+pub(super) fn read_robot(node: Node, taken: Option<&Robot>) -> Result<Robot, Error> {
+    let fields = node.table(ROBOT_KEYS)?.labelled("robot");
+    if let Some(urdf) = fields.field("urdf") {
+        return taken.map_or_else(|| read_urdf(&fields, &urdf.value), |robot| Ok(robot.clone()));
+    }
+    for key in ["tip", "pose"] {
         if let Some(field) = fields.field(key) {
-            return Err(field.value.error(
-                "robots from URDF files are not supported yet: write the joints as Denavit-Hartenberg rows, [[robot.joints]]",
-            ));
+            return Err(field.value.error("goes with `urdf`: rows end at the tip, and `base` is the robot's pose"));
         }
     }
     let convention =
@@ -24,6 +29,8 @@ pub(super) fn read_robot(node: Node) -> Result<Robot, Error> {
     Ok(Robot {
         convention: convention.unwrap_or_default(),
         base: fields.optional("base", read_pose)?,
+        link: fields.optional("link", |node| node.text().map(str::to_owned))?,
+        start: fields.optional("start", read_pose)?,
         joints: read_named(joints.as_ref(), "joint", JOINT_KEYS, problem_of_joint_name)?
             .into_iter()
             .map(|(name, fields)| read_joint(name, &fields))
@@ -32,7 +39,7 @@ pub(super) fn read_robot(node: Node) -> Result<Robot, Error> {
 }
 
 fn read_joint(name: String, fields: &Fields) -> Result<Joint, Error> {
-    Ok(Joint {
+    let joint = Joint {
         name,
         kind: fields
             .optional("type", |node| node.word("joint type", JointKind::ALL, JointKind::name))?
@@ -44,7 +51,16 @@ fn read_joint(name: String, fields: &Fields) -> Result<Joint, Error> {
         beta: fields.number("beta")?,
         reversed: fields.optional("reversed", Node::flag)?.unwrap_or_default(),
         limits: fields.optional("limits", read_limits)?.unwrap_or_default(),
-    })
+        link: fields.optional("link", |node| node.text().map(str::to_owned))?,
+        frame: fields.optional("frame", read_pose)?,
+    };
+    let unknown = [("offset", joint.offset), ("d", joint.d), ("a", joint.a), ("alpha", joint.alpha)];
+    match (fields.field("frame"), unknown.iter().find(|(_, value)| value.is_none())) {
+        (Some(frame), Some((name, _))) => {
+            Err(frame.value.error(format!("a frame stands against a row that is known, and this one has no `{name}`")))
+        }
+        _ => Ok(joint),
+    }
 }
 
 fn read_limits(node: &Node) -> Result<Limits, Error> {

@@ -5,17 +5,26 @@ use super::pose::read_pose;
 use crate::Error;
 use crate::camera::CameraModel;
 use crate::error::suggestion;
+use crate::intrinsics::read_intrinsics;
 use crate::rig::names::problem_of_name;
 use crate::rig::{Camera, Feature, Joint, Parent, Target};
 
 const CAMERA_KEYS: &[&str] =
-    &["name", "size", "model", "fx", "fy", "cx", "cy", "distortion", "depth", "parent", "pose"];
+    &["name", "size", "model", "fx", "fy", "cx", "cy", "distortion", "intrinsics", "depth", "parent", "pose"];
 const FEATURE_KEYS: &[&str] = &["name", "parent", "xyz"];
 const TARGET_KEYS: &[&str] = &["name", "parent", "pose"];
 
-pub(super) fn read_cameras(list: Option<Node>, joints: &[Joint]) -> Result<Vec<Camera>, Error> {
+/// `taken`: whether intrinsics of other files were taken over already, and are not read again.
+pub(super) fn read_cameras(list: Option<Node>, joints: &[Joint], taken: bool) -> Result<Vec<Camera>, Error> {
     let named = read_named(list.as_ref(), "camera", CAMERA_KEYS, problem_of_name)?;
-    named.into_iter().map(|(name, fields)| read_camera(name, &fields, joints)).collect()
+    let read = |(name, fields): (String, Fields)| {
+        let camera = read_camera(name, &fields, joints)?;
+        match fields.field("intrinsics") {
+            Some(intrinsics) if !taken => with_intrinsics(camera, &fields, &intrinsics.value),
+            _ => Ok(camera),
+        }
+    };
+    named.into_iter().map(read).collect()
 }
 
 fn read_camera(name: String, fields: &Fields, joints: &[Joint]) -> Result<Camera, Error> {
@@ -32,6 +41,41 @@ fn read_camera(name: String, fields: &Fields, joints: &[Joint]) -> Result<Camera
         depth: fields.optional("depth", Node::flag)?.unwrap_or(false),
         parent: fields.optional("parent", |node| read_parent(node, joints))?.unwrap_or(Parent::World),
         pose: fields.optional("pose", read_pose)?,
+    })
+}
+
+/// A camera of which a calibration file says the intrinsics: `intrinsics = "FILE"`, or `{ file, camera }` of several.
+fn with_intrinsics(camera: Camera, fields: &Fields, node: &Node) -> Result<Camera, Error> {
+    for key in ["model", "fx", "fy", "cx", "cy", "distortion"] {
+        if let Some(field) = fields.field(key) {
+            return Err(field.value.error("is what `intrinsics` says: one of the two"));
+        }
+    }
+    let (file, which) = if node.is_table() {
+        let fields = node.clone().table(&["file", "camera"])?;
+        let file = fields.field("file").ok_or_else(|| fields.error("has no `file`"))?.value;
+        (file, fields.optional("camera", |node| node.text().map(str::to_owned))?)
+    } else {
+        (node.clone(), None)
+    };
+    let (name, text) = file.text_of_file()?;
+    let said = read_intrinsics(&text, &name, which.as_deref())?;
+    if let (Some(given), Some(said)) = (camera.size, said.size)
+        && given != said
+    {
+        let problem =
+            format!("images are of {}x{} px there, and `size` is {}x{}", said[0], said[1], given[0], given[1]);
+        return Err(node.error(problem));
+    }
+    Ok(Camera {
+        size: camera.size.or(said.size),
+        model: Some(said.model),
+        fx: Some(said.focal[0]),
+        fy: Some(said.focal[1]),
+        cx: Some(said.centre[0]),
+        cy: Some(said.centre[1]),
+        distortion: Some(said.distortion),
+        ..camera
     })
 }
 
@@ -100,9 +144,12 @@ fn read_parent(node: &Node, joints: &[Joint]) -> Result<Parent, Error> {
     match node.text()? {
         "world" => Ok(Parent::World),
         "tip" => Ok(Parent::Tip),
-        name => joints.iter().position(|joint| joint.name == name).map(Parent::Link).ok_or_else(|| {
-            let known = ["world", "tip"].into_iter().chain(joints.iter().map(|joint| joint.name.as_str()));
-            node.error(format!("no joint is called `{name}` {}", suggestion(name, known)))
-        }),
+        name => {
+            let is_named = |joint: &Joint| joint.name == name || joint.link.as_deref() == Some(name);
+            joints.iter().position(is_named).map(Parent::Link).ok_or_else(|| {
+                let known = ["world", "tip"].into_iter().chain(joints.iter().map(|joint| joint.name.as_str()));
+                node.error(format!("no joint is called `{name}` {}", suggestion(name, known)))
+            })
+        }
     }
 }

@@ -17,6 +17,8 @@ pub(super) fn write_joint(table: &mut dyn TableLike, before: Option<&Joint>, now
     let reversed = |joint: &Joint| joint.reversed.then_some(true);
     writer.put("reversed", &reversed(before), &reversed(now), |v| Value::from(*v));
     write_limits(&mut writer, &before.limits, &now.limits);
+    writer.put("link", &before.link, &now.link, |link| Value::from(link.as_str()));
+    writer.put_pose("frame", &before.frame, &now.frame);
 }
 
 fn write_limits(writer: &mut Writer, before: &Limits, now: &Limits) {
@@ -48,6 +50,8 @@ pub(super) fn write_camera(
     let mut writer = Writer { table, fresh: before.is_none() };
     let (before, joints_before) = before.unwrap_or((&blank, &[]));
     writer.put_default("name", &before.name, &now.name, |name| Value::from(name.as_str()));
+    // Values, which say what was learned, take its place.
+    writer.table.remove("intrinsics");
     writer.put("size", &before.size, &now.size, |[w, h]| {
         Value::Array([i64::from(*w), i64::from(*h)].into_iter().collect::<Array>())
     });

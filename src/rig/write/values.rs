@@ -1,5 +1,5 @@
 //! Single values of a TOML document: numbers, arrays, poses, put where they differ from what stands there.
-use crate::rig::rotations;
+use crate::geometry::orientation;
 use handeye_solvers::Pose;
 use toml_edit::{Array, InlineTable, Item, TableLike, Value};
 
@@ -16,7 +16,7 @@ pub(super) fn numbers(values: &[f64]) -> Value {
 pub(super) fn pose(pose: &Pose) -> Value {
     let mut table = InlineTable::new();
     table.insert("xyz", numbers(pose.translation.as_slice()));
-    table.insert("quat", numbers(&rotations::to_quaternion(&pose.rotation)));
+    table.insert("quat", numbers(&orientation::to_quaternion(&pose.rotation)));
     Value::InlineTable(table)
 }
 
@@ -64,7 +64,7 @@ impl Writer<'_> {
             }
             if before.rotation != now.rotation {
                 table.remove("rpy");
-                set(table, "quat", numbers(&rotations::to_quaternion(&now.rotation)));
+                set(table, "quat", numbers(&orientation::to_quaternion(&now.rotation)));
             }
             return;
         }

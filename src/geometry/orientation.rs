@@ -30,6 +30,16 @@ pub(crate) fn from_rpy([roll, pitch, yaw]: [f64; 3]) -> Matrix3<f64> {
     )
 }
 
+/// Roll, pitch and yaw of a rotation, pitch within a quarter turn.
+pub(crate) fn to_rpy(r: &Matrix3<f64>) -> [f64; 3] {
+    let pitch = (-r[(2, 0)]).atan2(r[(0, 0)].hypot(r[(1, 0)]));
+    // With the pitch at a quarter turn, any yaw goes with a roll, which is what turns the other two axes as they are.
+    let yaw = r[(1, 0)].atan2(r[(0, 0)]);
+    let (s, c) = yaw.sin_cos();
+    let roll = (s * r[(0, 2)] - c * r[(1, 2)]).atan2(c * r[(1, 1)] - s * r[(0, 1)]);
+    [roll, pitch, yaw]
+}
+
 /// The unit quaternion that is written for a rotation, w >= 0.
 ///
 /// Reading it back and writing it again gives the same digits. Conversion alone does not, since matrix and quaternion
@@ -98,6 +108,20 @@ mod tests {
             * Rotation3::from_axis_angle(&Vector3::y_axis(), -0.4)
             * Rotation3::from_axis_angle(&Vector3::x_axis(), 2.5);
         assert!((from_rpy([2.5, -0.4, 1.3]) - theirs.matrix()).amax() < 1e-15);
+    }
+
+    #[test]
+    fn roll_pitch_yaw_that_are_written_read_back_as_the_rotation_with_the_pitch_at_a_quarter_turn_too() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(2);
+        let quarter = std::f64::consts::FRAC_PI_2;
+        for pitch in [0.3, -1.2, quarter, -quarter, quarter - 1e-9, 1e-9 - quarter, quarter - 1e-4] {
+            for _ in 0..200 {
+                let [roll, yaw] = std::array::from_fn(|_| random.random_range(-3.2..3.2));
+                let rotation = from_rpy([roll, pitch, yaw]);
+                let back = from_rpy(to_rpy(&rotation));
+                assert!((back - rotation).amax() < 1e-15, "{roll} {pitch} {yaw}: {:e}", (back - rotation).amax());
+            }
+        }
     }
 
     #[test]

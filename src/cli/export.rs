@@ -1,0 +1,104 @@
+//! `handeye export`: a rig as a file that others read.
+use super::answer::Answer;
+use super::inputs::{RigInput, check_output, read_rig};
+use clap::{Args, ValueEnum};
+use handeye::Error;
+use handeye::export::{to_camchain, to_intrinsics, to_static_transforms, to_tf, to_urdf};
+use handeye::intrinsics::{Intrinsics, to_camera_info, to_opencv};
+use handeye::rig::{Rig, read_text, replace_file};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Write what a rig says as a file that others read
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  handeye export learned.toml --to urdf --urdf arm.urdf -o calibrated.urdf   the same file with calibrated joint origins
+  handeye export arm.toml --to dh                                            a URDF's arm as Denavit-Hartenberg rows
+  handeye export learned.toml --to camera-info --camera left -o left.yaml
+  handeye export learned.toml --to static-transforms                         lines to run or to put into a launch file")]
+pub struct Export {
+    /// A rig file, or the name of a shipped rig
+    #[arg(value_name = "RIG")]
+    rig: PathBuf,
+    /// What to write
+    #[arg(long, value_name = "FORMAT")]
+    to: Format,
+    /// The URDF that the rig began as, for --to urdf
+    #[arg(long, value_name = "FILE", required_if_eq("to", "urdf"))]
+    urdf: Option<PathBuf>,
+    /// The camera, for --to camera-info and opencv, where the rig has several
+    #[arg(long, value_name = "NAME")]
+    camera: Option<String>,
+    /// The file to write [default: standard output]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Format {
+    /// The URDF of --urdf with the rig's joint origins; everything else in it stays as it is
+    Urdf,
+    /// A rig file with the arm as Denavit-Hartenberg rows
+    Dh,
+    /// A camera's intrinsics as ROS camera_info (YAML)
+    CameraInfo,
+    /// A camera's intrinsics as OpenCV's FileStorage reads them (YAML)
+    Opencv,
+    /// All cameras as a Kalibr camchain (YAML)
+    Kalibr,
+    /// Poses of the base and the cameras as a tf2_msgs/TFMessage (YAML)
+    Tf,
+    /// The same as command lines of static_transform_publisher (ROS 2)
+    StaticTransforms,
+}
+
+impl Export {
+    pub fn run(&self) -> Result<Answer, Error> {
+        let input = read_rig(&self.rig)?;
+        if let Some(output) = &self.output {
+            let inputs: Vec<PathBuf> = [Some(&self.rig), self.urdf.as_ref()].into_iter().flatten().cloned().collect();
+            check_output(output, &inputs)?;
+        }
+        let text = self.text(&input)?;
+        let mut json =
+            json!({ "rig": input.name, "output": self.output.as_ref().map(|path| path.display().to_string()) });
+        let Some(output) = &self.output else {
+            json["text"] = json!(text);
+            return Ok(Answer::new(text, json));
+        };
+        replace_file(output, |file| file.write_all(text.as_bytes()))?;
+        Ok(Answer::new(format!("{} is written\n", output.display()), json))
+    }
+
+    fn text(&self, RigInput { rig, text, .. }: &RigInput) -> Result<String, Error> {
+        match self.to {
+            Format::Dh => rig.update_toml(text),
+            Format::CameraInfo => to_camera_info(&self.intrinsics(rig)?),
+            Format::Opencv => Ok(to_opencv(&self.intrinsics(rig)?)),
+            Format::Kalibr => to_camchain(rig),
+            Format::Tf => to_tf(rig),
+            Format::StaticTransforms => to_static_transforms(rig),
+            Format::Urdf => {
+                let Some(path) = &self.urdf else {
+                    return Err(Error::Unusable("--to urdf needs --urdf FILE, the URDF that the rig began as".into()));
+                };
+                to_urdf(rig, &read_text(path)?, &path.display().to_string())
+            }
+        }
+    }
+
+    /// Those of the camera that was named, or of the only one.
+    fn intrinsics(&self, rig: &Rig) -> Result<Intrinsics, Error> {
+        let is_meant = |name: &str| self.camera.as_ref().is_none_or(|camera| camera == name);
+        let mut meant = rig.cameras.iter().filter(|camera| is_meant(&camera.name));
+        match (meant.next(), meant.next()) {
+            (Some(camera), None) => to_intrinsics(camera),
+            _ if rig.cameras.is_empty() => Err(Error::Unusable("the rig has no cameras".into())),
+            _ => {
+                let names: Vec<&str> = rig.cameras.iter().map(|camera| camera.name.as_str()).collect();
+                Err(Error::Unusable(format!("--camera has to name one of the rig's cameras: {}", names.join(", "))))
+            }
+        }
+    }
+}

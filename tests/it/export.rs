@@ -1,0 +1,110 @@
+//! What others read of a rig: where its cameras stand, in ROS and Kalibr, and every format from the command line.
+use crate::cli::Folder;
+use crate::intrinsics::same;
+use handeye::export::{to_camchain, to_intrinsics, to_static_transforms, to_tf};
+use handeye::intrinsics::read_intrinsics;
+use handeye::rig::{Camera, Parent, Rig, catalog};
+use handeye::solvers::Pose;
+use handeye::solvers::manifold::so3;
+use nalgebra::Vector3;
+
+fn ur5_with_a_camera_on_the_hand() -> Rig {
+    let mut rig = catalog::rig("ur5").unwrap();
+    rig.robot.base = Some(Pose::new(Vector3::new(0.1, -0.2, 0.3), Vector3::new(1.0, 2.0, 3.0)));
+    let hand = Camera { name: "it's a hand".into(), parent: Parent::Tip, ..rig.cameras[0].clone() };
+    let elbow = Camera { name: "elbow".into(), parent: Parent::Link(2), ..rig.cameras[1].clone() };
+    rig.cameras.extend([hand, elbow]);
+    rig.robot.link = Some("base_link".into());
+    rig.robot.joints[2].link = Some("forearm_link".into());
+    rig.robot.joints[5].link = Some("tool0".into());
+    rig
+}
+
+#[test]
+fn static_transforms_put_base_and_cameras_where_they_are() {
+    let rig = ur5_with_a_camera_on_the_hand();
+    let text = to_static_transforms(&rig).unwrap();
+    let mut found = Vec::new();
+    for line in text.lines() {
+        let value = |key: &str| {
+            let rest = line.split(&format!("--{key} ")).nth(1).unwrap();
+            rest.split(" --").next().unwrap().to_owned()
+        };
+        let number = |key: &str| value(key).parse::<f64>().unwrap();
+        let rotation = so3::from_quaternion(["qx", "qy", "qz", "qw"].map(number));
+        let pose = Pose { rotation, translation: Vector3::from(["x", "y", "z"].map(number)) };
+        assert!(line.starts_with("ros2 run tf2_ros static_transform_publisher --x "));
+        found.push((value("frame-id"), value("child-frame-id"), pose));
+    }
+    let expected = [
+        ("world", "base_link", rig.robot.base),
+        ("world", "left", rig.cameras[0].pose),
+        ("world", "right", rig.cameras[1].pose),
+        ("tool0", r"'it'\''s a hand'", rig.cameras[2].pose),
+        ("forearm_link", "elbow", rig.cameras[3].pose),
+    ];
+    assert_eq!(found.len(), expected.len(), "{text}");
+    for ((parent, child, pose), expected) in found.iter().zip(expected) {
+        assert_eq!((parent.as_str(), child.as_str()), (expected.0, expected.1));
+        let expected = expected.2.unwrap();
+        assert_eq!(pose.translation, expected.translation);
+        assert!((pose.rotation - expected.rotation).amax() < 1e-15);
+    }
+    // The same numbers as a message.
+    let message = to_tf(&rig).unwrap();
+    assert_eq!(message.matches("- header:\n    frame_id: \"").count(), 5, "{message}");
+    assert!(message.contains("child_frame_id: \"it's a hand\"\n"), "{message}");
+    for number in text.split_whitespace().filter(|word| word.parse::<f64>().is_ok()) {
+        assert!(message.contains(&format!(": {number}")), "{number} in\n{message}");
+    }
+}
+
+#[test]
+fn a_camchain_says_how_each_camera_stands_against_the_one_before() {
+    let rig = catalog::rig("ur5").unwrap();
+    let text = to_camchain(&rig).unwrap();
+    let rows: Vec<Vec<f64>> = text
+        .lines()
+        .filter_map(|line| line.strip_prefix("  - ["))
+        .map(|row| row.trim_end_matches(']').split(", ").map(|x| x.parse().unwrap()).collect())
+        .collect();
+    let [left, right] = [0, 1].map(|camera: usize| rig.cameras[camera].pose.unwrap());
+    let in_left = Vector3::new(0.1, -0.3, 1.2);
+    let expected = right.inverse_transform(&left.transform(&in_left));
+    for i in 0..3 {
+        let found = (0..3).map(|k| rows[i][k] * in_left[k]).sum::<f64>() + rows[i][3];
+        assert!((found - expected[i]).abs() < 1e-14, "{text}");
+    }
+}
+
+#[test]
+fn export_writes_every_format_from_the_command_line() {
+    let folder = Folder::new("export");
+    for (arguments, words) in [
+        ("export ur5 --to camera-info --camera left", "distortion_model: plumb_bob"),
+        ("export ur5 --to opencv --camera right", "%YAML:1.0"),
+        ("export ur5 --to kalibr", "T_cn_cnm1"),
+        ("export ur5 --to tf", "transforms:"),
+        ("export ur5 --to static-transforms", "static_transform_publisher"),
+        ("export ur5 --to dh", "[[robot.joints]]"),
+    ] {
+        let (out, _) = folder.expect(0, arguments);
+        assert!(out.contains(words), "{arguments}\n{out}");
+        folder.expect(0, &format!("{arguments} -o out"));
+        assert_eq!(folder.read("out"), out, "{arguments}");
+    }
+    for (arguments, words) in [
+        ("export ur5 --to opencv", "--camera has to name one of the rig's cameras: left, right"),
+        ("export ur5 --to opencv --camera middle", "left, right"),
+        ("export ur3e --to opencv", "the rig has no cameras"),
+        ("export ur5 --to urdf", "--urdf"),
+        ("export ur5 --to urdf --urdf absent", "absent: "),
+        ("export absent.toml --to tf", "absent.toml: "),
+    ] {
+        let (_, err) = folder.expect(2, arguments);
+        assert!(err.contains(words), "{arguments}\n{err}");
+    }
+    let camera = &catalog::rig("ur5").unwrap().cameras[0];
+    let (text, _) = folder.expect(0, "export ur5 --to camera-info --camera left");
+    assert!(same(&to_intrinsics(camera).unwrap(), &read_intrinsics(&text, "x", None).unwrap()));
+}
