@@ -40,7 +40,7 @@ ARMS = {
 def pinocchio_links(path, base, tip, names, joints):
     """Poses in the base of the joints' links and, last, the tip."""
     model = pin.buildModelFromUrdf(str(path))
-    data, base, tip = model.createData(), model.getFrameId(base), model.getFrameId(tip)
+    data, base, tip = model.createData(), model.getFrameId(base, pin.FrameType.BODY), model.getFrameId(tip, pin.FrameType.BODY)
     ids = [model.getJointId(name) for name in names]
     out = np.empty((len(joints), len(names), 12))
     for i, row in enumerate(joints):
@@ -91,7 +91,7 @@ def main():
 def joints_between(path, base, tip):
     """How many joints move between two links."""
     model = pin.buildModelFromUrdf(str(path))
-    support = lambda link: set(model.supports[model.frames[model.getFrameId(link)].parentJoint])
+    support = lambda link: set(model.supports[model.frames[model.getFrameId(link, pin.FrameType.BODY)].parentJoint])
     return len(support(tip) - support(base))
 
 
