@@ -12,10 +12,6 @@ use handeye::servo::{
 };
 use handeye::simulate::{SimulateOptions, random_rig, simulate};
 
-#[path = "common/counting.rs"]
-mod counting;
-use counting::asked;
-
 /// Steps that are timed.
 const STEPS: usize = 2_000;
 
@@ -84,11 +80,7 @@ impl Problem {
             limits.clear(6);
             self.image.iter().for_each(|image| image.rows(&self.arm, &at, 1.0, &mut limits));
             bounds.update(self.arm.limits(), joints, &[0.0; 6], 1.0);
-            let start = (asked(), ThreadTime::now());
-            let step = solver.solve(&tasks, &limits, &bounds);
-            let spent = (asked() - start.0, 1e6 * start.1.elapsed().as_secs_f64());
-            assert!(!step.failed);
-            spent
+            spent(|| assert!(!solver.solve(&tasks, &limits, &bounds).failed))
         })
     }
 
@@ -98,12 +90,10 @@ impl Problem {
         let goals = [Goal::new(&self.task)];
         let limits: Vec<&dyn Limit> = self.image.iter().map(|image| image as &dyn Limit).collect();
         Times::of(&self.places, |joints| {
-            let start = (asked(), ThreadTime::now());
-            self.arm.configure(joints, &mut at);
-            let step = stepper.step(&self.arm, &at, &goals, &limits, 1.0);
-            let spent = (asked() - start.0, 1e6 * start.1.elapsed().as_secs_f64());
-            assert!(!step.failed);
-            spent
+            spent(|| {
+                self.arm.configure(joints, &mut at);
+                assert!(!stepper.step(&self.arm, &at, &goals, &limits, 1.0).failed);
+            })
         })
     }
 }
@@ -127,24 +117,27 @@ fn image_based() -> Times {
     servo.aim(&look(&places.pop().expect("asked for")));
     Times::of(&places, |joints| {
         let seen = look(joints);
-        let start = (asked(), ThreadTime::now());
-        let step = servo.step(&seen, joints, &[], 100.0).expect("the features are seen");
-        let spent = (asked() - start.0, 1e6 * start.1.elapsed().as_secs_f64());
-        assert!(!step.failed);
-        spent
+        spent(|| assert!(!servo.step(&seen, joints, &[], 100.0).expect("the features are seen").failed))
     })
+}
+
+/// How often some work asks for memory, and its CPU time [µs].
+fn spent(work: impl FnOnce()) -> (u64, f64) {
+    let start = ThreadTime::now();
+    let asked = allocation_counter::measure(work).count_total;
+    (asked, 1e6 * start.elapsed().as_secs_f64())
 }
 
 struct Times {
     median: f64,
     slow: f64,
     /// Most that one step asked for, but for the first 100.
-    asked: usize,
+    asked: u64,
 }
 
 impl Times {
-    fn of(places: &[Vec<f64>], mut step: impl FnMut(&[f64]) -> (usize, f64)) -> Self {
-        let (asked, mut times): (Vec<usize>, Vec<f64>) = places.iter().map(|joints| step(joints)).unzip();
+    fn of(places: &[Vec<f64>], mut step: impl FnMut(&[f64]) -> (u64, f64)) -> Self {
+        let (asked, mut times): (Vec<u64>, Vec<f64>) = places.iter().map(|joints| step(joints)).unzip();
         times.sort_by(f64::total_cmp);
         let most = asked[100..].iter().copied().max().unwrap_or(0);
         Times { median: times[times.len() / 2], slow: times[times.len() * 99 / 100], asked: most }

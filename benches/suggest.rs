@@ -11,7 +11,6 @@ use std::ops::ControlFlow;
 use visits::{gauge_alone, tip_error, visit};
 
 #[path = "common/visits.rs"]
-#[allow(dead_code)]
 mod visits;
 
 /// Samples before, and how many are added.

@@ -1,9 +1,5 @@
 //! A control loop does not wait for memory, and may run on any thread.
-#[path = "../../benches/common/counting.rs"]
-mod counting;
-
 use crate::servo::{look, moved, positions};
-use counting::asked;
 use handeye::rig::catalog;
 use handeye::servo::limits::{HalfSpace, InImage, TipSpeed};
 use handeye::servo::tasks::ImagePoints;
@@ -26,17 +22,20 @@ fn steps_with_active_limits_ask_for_no_memory_after_the_first() {
         let above = HalfSpace { normal: -Vector3::z(), offset: -height, strength: 10.0 };
         let (goals, limits): (_, [&dyn Limit; 3]) = ([Goal::new(&task)], [&image, &slow, &above]);
         for index in 0..200 {
-            let before = asked();
-            arm.configure(&joints, &mut at);
-            let step = stepper.step(&arm, &at, &goals, &limits, 0.01);
-            let more = asked() - before;
-            if step.conflict.is_empty() {
+            let (mut is_held, mut is_conflict) = (false, false);
+            let more = allocation_counter::measure(|| {
+                arm.configure(&joints, &mut at);
+                let step = stepper.step(&arm, &at, &goals, &limits, 0.01);
+                (is_held, is_conflict) = (!step.active.is_empty(), !step.conflict.is_empty());
+                moved(&mut joints, &step.motion);
+            });
+            let more = more.count_total;
+            if !is_conflict {
                 assert!(index == 0 || more == 0, "step {index} asked for memory {more} times");
-                active += usize::from(!step.active.is_empty());
+                active += usize::from(is_held);
             } else if index > 0 {
                 conflicts.push(more);
             }
-            moved(&mut joints, &step.motion);
         }
     }
     assert!(active > 500 && conflicts.len() > 20, "{active} steps with active limits, {} conflicts", conflicts.len());
