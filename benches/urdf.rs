@@ -8,17 +8,17 @@ use handeye::solvers::Pose;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
+use std::io::IsTerminal;
 use std::path::Path;
 
 /// By how much rows are disturbed [m and rad].
 const DISTURBED: f64 = 0.02;
 
 fn main() {
-    // Cargo runs benches with --bench; without arms to read there is nothing to do.
-    let arms: Vec<Value> = serde_json::from_reader(std::io::stdin()).unwrap_or_default();
-    if arms.is_empty() {
+    if std::io::stdin().is_terminal() {
         return println!("run benches/urdf.py, which compares with Pinocchio");
     }
+    let arms: Vec<Value> = serde_json::from_reader(std::io::stdin()).expect("a JSON list of arms");
     let answers: Vec<Value> =
         arms.iter().map(|arm| answer(arm).unwrap_or_else(|error| json!({ "error": error.to_string() }))).collect();
     println!("{}", Value::from(answers));
@@ -28,7 +28,7 @@ fn answer(arm: &Value) -> Result<Value, handeye::Error> {
     let text = |key: &str| arm[key].as_str().unwrap_or_default();
     let [urdf, base, tip] = ["urdf", "base", "tip"].map(text);
     let rig = Rig::parse(&format!("[robot]\nurdf = {urdf:?}\nbase = {base:?}\ntip = {tip:?}\n"), "rig.toml")?;
-    let joints: Vec<Vec<f64>> = serde_json::from_value(arm["joints"].clone()).unwrap_or_default();
+    let joints: Vec<Vec<f64>> = serde_json::from_value(arm["joints"].clone()).expect("rows of joints");
     let original = read_text(Path::new(urdf))?;
     // The rig file with rows, read back.
     let rows = Rig::parse(&rig.to_toml(), "rows")?;

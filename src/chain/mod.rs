@@ -14,7 +14,7 @@ pub use joint_chain::{Axis, JointChain, Posture};
 /// Numbers of a link: offset [rad], d [m], a [m], alpha [rad], beta [rad].
 pub const LINK_PARAMETERS: usize = 5;
 
-/// Sine of the angle between two axes below which they count as parallel [about 11°]: their common normal is ill-defined,
+/// Sine of the angle between two axes below which they count as parallel [about 11.5°]: their common normal is ill-defined,
 /// and Hayati's beta describes the second in place of d.
 pub(crate) const PARALLEL: f64 = 0.2;
 

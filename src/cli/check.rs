@@ -141,9 +141,11 @@ fn describe(rig: &Rig, file: &str, counts: &Counts) -> String {
     }
     if let Some(fit) = &rig.fit {
         let (samples, rejected) = (count(fit.samples, "sample"), fit.rejected);
-        let points = fit.rms_points_m.map_or_else(String::new, |rms| format!(", points {:.3} mm rms", 1e3 * rms));
-        text +=
-            &format!("  learned   from {samples}, {:.3} px rms{points}, {rejected} detections left out\n", fit.rms_px);
+        let points = fit.rms_points_m.map_or_else(String::new, |rms| format!(" points {:.3} mm rms,", 1e3 * rms));
+        // A rig that was learned from points alone has no pixel error.
+        let is_pixels = fit.rms_points_m.is_none() || fit.rms_px > 0.0;
+        let pixels = if is_pixels { format!(" {:.3} px rms,", fit.rms_px) } else { String::new() };
+        text += &format!("  learned   from {samples},{pixels}{points} {rejected} detections left out\n");
     }
     text += &format!("\n{}", counts.table());
     for (what, paths) in [("unknown", &counts.unknown), ("held", &counts.held)] {

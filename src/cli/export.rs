@@ -72,6 +72,14 @@ impl Export {
     }
 
     fn text(&self, RigInput { rig, text, .. }: &RigInput) -> Result<String, Error> {
+        if self.urdf.is_some() && !matches!(self.to, Format::Urdf) {
+            return Err(Error::Unusable("--urdf is for --to urdf".into()));
+        }
+        if self.camera.is_some() && !matches!(self.to, Format::CameraInfo | Format::Opencv) {
+            return Err(Error::Unusable(
+                "--camera is for --to camera-info and --to opencv: others take all cameras".into(),
+            ));
+        }
         match self.to {
             Format::Dh => rig.update_toml(text),
             Format::CameraInfo => to_camera_info(&self.intrinsics(rig)?),

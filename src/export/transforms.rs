@@ -60,8 +60,9 @@ fn transforms(rig: &Rig) -> Result<Vec<Transform>, Error> {
         Parent::Tip => joints.last().and_then(|joint| joint.link.clone()).unwrap_or_else(|| "tip".to_owned()),
     };
     let mut all = Vec::new();
-    if let Some(pose) = rig.robot.base.filter(|_| !joints.is_empty()) {
-        let child = rig.robot.link.clone().unwrap_or_else(|| "base".to_owned());
+    let child = rig.robot.link.clone().unwrap_or_else(|| "base".to_owned());
+    // A base that is called the world, as in many URDFs, is no child of it.
+    if let Some(pose) = rig.robot.base.filter(|_| !joints.is_empty() && child != "world") {
         all.push(Transform { parent: name(Parent::World), child, pose });
     }
     for camera in &rig.cameras {

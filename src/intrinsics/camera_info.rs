@@ -1,6 +1,6 @@
 //! ROS camera_info: the YAML of camera_calibration and camera_info_manager, and sensor_msgs/CameraInfo as `ros2 topic echo` prints it.
 use super::Intrinsics;
-use super::parts::{list, read_distortion, read_matrix, read_model, read_side};
+use super::parts::{list, read_distortion, read_matrix, read_model, read_size};
 use super::yaml::{Document, Node};
 use crate::Error;
 use crate::camera::CameraModel;
@@ -16,11 +16,9 @@ pub(super) fn read(document: &Document) -> Result<Intrinsics, Error> {
     let matrix = root.any(MATRIX).ok_or_else(|| document.error(root, "has no `camera_matrix` (or `k`)"))?;
     let (focal, centre) = read_matrix(document, matrix)?;
     let coefficients = root.any(DISTORTION).map(|node| read_distortion(document, node, model)).transpose()?;
-    let side = |keys: &[&str]| root.any(keys).map(|node| read_side(document, node)).transpose();
-    let size = side(&["image_width", "width"])?.zip(side(&["image_height", "height"])?);
     Ok(Intrinsics {
         name: root.get("camera_name").and_then(Node::text).map(str::to_owned),
-        size: size.map(|(width, height)| [width, height]),
+        size: read_size(document, root, [&["image_width", "width"], &["image_height", "height"]])?,
         model,
         focal,
         centre,

@@ -1,6 +1,6 @@
 //! OpenCV's calibration files, as cv::FileStorage writes them in YAML.
 use super::Intrinsics;
-use super::parts::{data, list, read_distortion, read_matrix, read_side};
+use super::parts::{data, list, read_distortion, read_matrix, read_size};
 use super::yaml::{Document, Node};
 use crate::Error;
 use crate::camera::CameraModel;
@@ -19,7 +19,8 @@ pub(super) fn read(document: &Document) -> Result<Intrinsics, Error> {
     let matrix = root.any(MATRIX).ok_or_else(|| document.error(root, "has no `camera_matrix`"))?;
     let (focal, centre) = read_matrix(document, matrix)?;
     let is_fisheye = root.get("fisheye_model").is_some_and(|node| node.text() == Some("1"));
-    let (mut model, mut distortion) = (CameraModel::Pinhole, Vec::new());
+    let pinhole = if is_fisheye { CameraModel::KannalaBrandt } else { CameraModel::Pinhole };
+    let (mut model, mut distortion) = (pinhole, Vec::new());
     if let Some(node) = root.any(DISTORTION) {
         let n = data(node).items().len();
         model = match n {
@@ -31,11 +32,9 @@ pub(super) fn read(document: &Document) -> Result<Intrinsics, Error> {
         };
         distortion = read_distortion(document, node, model)?;
     }
-    let side = |keys: &[&str]| root.any(keys).map(|node| read_side(document, node)).transpose();
-    let size = side(&["image_width", "image_Width"])?.zip(side(&["image_height", "image_Height"])?);
     Ok(Intrinsics {
         name: root.get("camera_name").and_then(Node::text).map(str::to_owned),
-        size: size.map(|(width, height)| [width, height]),
+        size: read_size(document, root, [&["image_width", "image_Width"], &["image_height", "image_Height"]])?,
         model,
         focal,
         centre,

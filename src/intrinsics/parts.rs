@@ -67,6 +67,16 @@ pub(super) fn data(node: &Node) -> &Node {
     node.get("data").unwrap_or(node)
 }
 
+/// Width and height of the images by any of some keys; `None` where either is not given.
+pub(super) fn read_size(document: &Document, root: &Node, keys: [&[&str]; 2]) -> Result<Option<[u32; 2]>, Error> {
+    let [width, height] = keys.map(|keys| root.any(keys).map(|node| read_side(document, node)).transpose());
+    match (width?, height?) {
+        (Some(width), Some(height)) => Ok(Some([width, height])),
+        (None, None) => Ok(None),
+        _ => Err(document.error(root, format!("has one of `{}` and `{}` and not the other", keys[0][0], keys[1][0]))),
+    }
+}
+
 /// A side of an image [px].
 pub(super) fn read_side(document: &Document, node: &Node) -> Result<u32, Error> {
     let side = node.text().and_then(|text| text.parse().ok()).filter(|side: &u32| *side > 0);

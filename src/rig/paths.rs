@@ -209,7 +209,7 @@ impl Rig {
     /// Where several patterns match, the most specific counts: that with the fewest `*`, then the longest.
     pub fn prior_sd(&self, parameter: &Parameter) -> Option<f64> {
         let path = parameter.path(self);
-        let stars = |pattern: &str| pattern.split('.').filter(|component| component.contains('*')).count();
+        let stars = |pattern: &str| pattern.matches('*').count();
         let matching = self.estimate.prior.iter().filter(|(pattern, _)| matches(pattern, &path));
         let (_, sd) = matching.min_by_key(|(pattern, _)| {
             (stars(pattern), std::cmp::Reverse(pattern.split('.').count()), std::cmp::Reverse(pattern.len()))

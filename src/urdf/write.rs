@@ -53,7 +53,8 @@ impl Urdf<'_> {
                 // In front of the first element, indented as that is.
                 let place = node.first_element_child().map_or(node.range().end, |first| first.range().start);
                 let indent = &self.source.text[node.range().start..place];
-                let indent = indent.rfind('\n').map_or("", |newline| &indent[newline..]);
+                let indent = indent.rfind('\n').map(|newline| &indent[newline..]);
+                let indent = indent.filter(|indent| indent.trim().is_empty()).unwrap_or("");
                 edits.push((place..place, format!("<origin{attributes}/>{indent}")));
             }
             return;

@@ -97,6 +97,8 @@ fn export_writes_every_format_from_the_command_line() {
         ("export ur5 --to opencv", "--camera has to name one of the rig's cameras: left, right"),
         ("export ur5 --to opencv --camera middle", "left, right"),
         ("export ur3e --to opencv", "the rig has no cameras"),
+        ("export ur5 --to tf --camera left", "--camera is for"),
+        ("export ur5 --to dh --urdf absent", "--urdf is for --to urdf"),
         ("export ur5 --to urdf", "--urdf"),
         ("export ur5 --to urdf --urdf absent", "absent: "),
         ("export absent.toml --to tf", "absent.toml: "),

@@ -36,7 +36,6 @@ fn random_rig(seed: u64) -> Rig {
         Rig { name: maybe(random, |r| format!("rig \"{}\" ü\\\n#", r.random_range(0..9))), ..Rig::default() };
     rig.robot.convention = Convention::ALL[random.random_range(0..Convention::ALL.len())];
     rig.robot.base = maybe(random, random_pose);
-    rig.robot.start = maybe(random, random_pose);
     rig.robot.link = maybe(random, |_| "base_link".to_owned());
     for index in 0..random.random_range(0..8) {
         let lower = maybe(random, random_number);
@@ -55,13 +54,20 @@ fn random_rig(seed: u64) -> Rig {
                 velocity: maybe(random, |r| r.random_range(0.1..3.0)),
                 acceleration: maybe(random, |r| r.random_range(0.1..30.0)),
             },
-            link: maybe(random, |r| format!("link {}", r.random_range(0..9))),
+            link: maybe(random, |r| {
+                if r.random_bool(0.3) { "joint 1".to_owned() } else { format!("link {}", r.random_range(0..9)) }
+            }),
             frame: None,
         });
         let joint = rig.robot.joints.last_mut().unwrap();
         if [joint.offset, joint.d, joint.a, joint.alpha].iter().all(Option::is_some) {
             joint.frame = maybe(random, random_pose);
         }
+    }
+    // `start` is the nominal pose of a chain whose rows are all known
+    let is_known = |joint: &Joint| [joint.offset, joint.d, joint.a, joint.alpha].iter().all(Option::is_some);
+    if rig.robot.joints.iter().all(is_known) {
+        rig.robot.start = maybe(random, random_pose);
     }
     let n_joints = rig.robot.joints.len();
     let parent = |random: &mut ChaCha8Rng| match random.random_range(0..3) {

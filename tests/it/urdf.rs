@@ -30,7 +30,7 @@ pub const ARM: &str = r#"<?xml version="1.0"?>
   <joint name="lift" type="revolute">
     <parent link="shoulder"/>
     <child link="upper_arm"/>
-    <origin rpy="0 1.5707963 0" xyz="0 0.1358 0"></origin>
+    <origin rpy="0 1.5707963267948966 0" xyz="0 0.1358 0"></origin>
     <axis xyz="0 1 0"/>
     <limit lower="-1.9" upper="-1.0" velocity="3.15" effort="150"/>
   </joint>
@@ -50,7 +50,7 @@ pub const ARM: &str = r#"<?xml version="1.0"?>
   <joint name="roll" type="continuous">
     <parent link="forearm"/>
     <child link="wrist_1"/>
-    <origin xyz="0 0 0.392" rpy="0 1.5707963 0"/>
+    <origin xyz="0 0 0.392" rpy="0 1.5707963267948966 0"/>
     <axis xyz="0 2 0"/>
     <limit velocity="3.2" effort="28"/>
   </joint>
@@ -69,7 +69,7 @@ pub const ARM: &str = r#"<?xml version="1.0"?>
   </joint>
   <joint name="flange_joint" type="fixed">
     <parent link="wrist_3"/> <child link="flange"/>
-    <origin xyz="0 0.0823 0" rpy="0 0 1.5707963"/>
+    <origin xyz="0 0.0823 0" rpy="0 0 1.5707963267948966"/>
   </joint>
   <joint name="tool_joint" type="fixed">
     <parent link="flange"/> <child link="tool0"/>
@@ -77,7 +77,7 @@ pub const ARM: &str = r#"<?xml version="1.0"?>
   </joint>
   <joint name="base_joint" type="fixed">
     <parent link="base_link"/> <child link="base"/>
-    <origin rpy="0 0 3.14159265"/>
+    <origin rpy="0 0 3.141592653589793"/>
   </joint>
   <joint name="finger_joint" type="prismatic">
     <parent link="tool0"/> <child link="finger"/>
@@ -123,9 +123,7 @@ fn turned(axis: [f64; 3], angle: f64) -> Pose {
 
 /// Links of the joints of `ARM` in its base, and the tip in place of the last, written down joint by joint.
 fn links_by_hand(q: &[f64]) -> Vec<Pose> {
-    // As the file says it.
-    #[allow(clippy::approx_constant)]
-    const QUARTER: f64 = 1.5707963;
+    const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
     let steps = [
         placed([0.0, 0.0, 0.0892], [0.0; 3]) * turned([0.0, 0.0, 1.0], q[0]),
         placed([0.0, 0.1358, 0.0], [0.0, QUARTER, 0.0]) * turned([0.0, 1.0, 0.0], q[1]),
@@ -198,10 +196,8 @@ fn the_base_may_hang_on_the_arm_by_fixed_joints_and_stand_anywhere_in_the_world(
     let pose = "pose = { xyz = [1, 2, 3], rpy = [0.1, 0.2, 0.3] }\n";
     let rig = rig_of(ARM, &format!("base = \"base\"\ntip = \"tool0\"\n{pose}")).unwrap();
     let model = Model::new(&rig).unwrap();
-    // As the file says it.
-    #[allow(clippy::approx_constant)]
-    const HALF: f64 = 3.14159265;
-    let world_from_base_link = placed([1.0, 2.0, 3.0], [0.1, 0.2, 0.3]) * placed([0.0; 3], [0.0, 0.0, HALF]).inverse();
+    let world_from_base_link =
+        placed([1.0, 2.0, 3.0], [0.1, 0.2, 0.3]) * placed([0.0; 3], [0.0, 0.0, std::f64::consts::PI]).inverse();
     for q in positions(6, 50) {
         assert!(distance(&model.tip(&q), &(world_from_base_link * links_by_hand(&q)[5])) < 1e-12);
     }

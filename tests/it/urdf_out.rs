@@ -215,3 +215,24 @@ fn random_arms_with_axes_anywhere_are_read_and_written_exactly() {
         assert!(furthest(&off, &back) < 1e-10, "case {case}: {:e}", furthest(&off, &back));
     }
 }
+
+#[test]
+fn an_origin_that_is_put_in_repeats_nothing_of_the_file() {
+    for between in
+        ["\n    type=\"revolute\"><parent link=\"a\"/>", " type=\"revolute\">\n  <!-- c --><parent link=\"a\"/>"]
+    {
+        let text = format!(
+            "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/>\n<joint name=\"j\"{between}<child link=\"b\"/>\
+             <limit lower=\"-1\" upper=\"1\"/></joint></robot>"
+        );
+        let mut rig = rig_of(&text, "").unwrap();
+        rig.robot.joints[0].d = Some(0.25);
+        let out = to_urdf(&rig, &text, "r.urdf").unwrap();
+        assert_eq!(
+            out.matches("type=").count() + out.matches("<!--").count(),
+            text.matches("type=").count() + text.matches("<!--").count()
+        );
+        let back = rig_of(&out, "").unwrap();
+        assert!(furthest(&rig, &back) < 1e-12, "{out}");
+    }
+}

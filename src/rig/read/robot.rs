@@ -23,18 +23,25 @@ pub(super) fn read_robot(node: Node, taken: Option<&Robot>) -> Result<Robot, Err
             return Err(field.value.error("goes with `urdf`: rows end at the tip, and `base` is the robot's pose"));
         }
     }
+    let start = fields.optional("start", read_pose)?;
     let convention =
         fields.optional("convention", |node| node.word("convention", Convention::ALL, Convention::name))?;
     let joints = fields.field("joints").map(|field| field.value);
+    let joints: Vec<Joint> = read_named(joints.as_ref(), "joint", JOINT_KEYS, problem_of_joint_name)?
+        .into_iter()
+        .map(|(name, fields)| read_joint(name, &fields))
+        .collect::<Result<_, Error>>()?;
+    let is_known = |joint: &Joint| [joint.offset, joint.d, joint.a, joint.alpha].iter().all(Option::is_some);
+    if let (Some(field), Some(joint)) = (fields.field("start"), joints.iter().find(|joint| !is_known(joint))) {
+        let problem = format!("it leads to rows that are known, and that of joint `{}` is not", joint.name);
+        return Err(field.value.error(problem));
+    }
     Ok(Robot {
         convention: convention.unwrap_or_default(),
         base: fields.optional("base", read_pose)?,
         link: fields.optional("link", |node| node.text().map(str::to_owned))?,
-        start: fields.optional("start", read_pose)?,
-        joints: read_named(joints.as_ref(), "joint", JOINT_KEYS, problem_of_joint_name)?
-            .into_iter()
-            .map(|(name, fields)| read_joint(name, &fields))
-            .collect::<Result<_, Error>>()?,
+        start,
+        joints,
     })
 }
 

@@ -145,10 +145,16 @@ fn read_parent(node: &Node, joints: &[Joint]) -> Result<Parent, Error> {
         "world" => Ok(Parent::World),
         "tip" => Ok(Parent::Tip),
         name => {
-            let is_named = |joint: &Joint| joint.name == name || joint.link.as_deref() == Some(name);
-            joints.iter().position(is_named).map(Parent::Link).ok_or_else(|| {
-                let known = ["world", "tip"].into_iter().chain(joints.iter().map(|joint| joint.name.as_str()));
-                node.error(format!("no joint is called `{name}` {}", suggestion(name, known)))
+            // A joint's name goes before a link's: it is what is written.
+            let joint = joints.iter().position(|joint| joint.name == name);
+            let link = || joints.iter().position(|joint| joint.link.as_deref() == Some(name));
+            joint.or_else(link).map(Parent::Link).ok_or_else(|| {
+                let links = joints.iter().filter_map(|joint| joint.link.as_deref());
+                let names = joints.iter().map(|joint| joint.name.as_str()).chain(links);
+                node.error(format!(
+                    "no joint is called `{name}` {}",
+                    suggestion(name, ["world", "tip"].into_iter().chain(names))
+                ))
             })
         }
     }
