@@ -219,7 +219,10 @@ impl Errors {
 
 /// Root mean square, mean, median and largest; 0 of nothing.
 fn summary(values: &mut [f64]) -> [f64; 4] {
-    let n = values.len().max(1) as f64;
+    if values.is_empty() {
+        return [0.0; 4];
+    }
+    let n = values.len() as f64;
     let median = median(values);
     let rms = (values.iter().map(|d| d * d).sum::<f64>() / n).sqrt();
     [rms, values.iter().sum::<f64>() / n, median, values.last().copied().unwrap_or(0.0)]

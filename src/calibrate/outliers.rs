@@ -143,8 +143,12 @@ fn yardsticks(setup: &Setup, state: &State, left_out: &[bool], distances: &[f64]
 fn bumped_cameras(moved: &[bool], medians: &BTreeMap<Image, f64>, wrong_images: &BTreeSet<Image>) -> Vec<usize> {
     let mut bumped = Vec::new();
     for camera in (0..moved.len()).filter(|&camera| !moved[camera]) {
-        let wrong: Vec<bool> =
-            medians.keys().filter(|key| key.1 == camera).map(|key| wrong_images.contains(key)).collect();
+        // A sample counts once, whether pixels, points or both of it are wrong.
+        let mut by_sample: BTreeMap<usize, bool> = BTreeMap::new();
+        for key in medians.keys().filter(|key| key.1 == camera) {
+            *by_sample.entry(key.0).or_default() |= wrong_images.contains(key);
+        }
+        let wrong: Vec<bool> = by_sample.into_values().collect();
         let count = wrong.iter().filter(|wrong| **wrong).count();
         let at_one_end = wrong[..count].iter().all(|wrong| *wrong) || wrong[wrong.len() - count..].iter().all(|w| *w);
         let others = moved.iter().filter(|moved| !**moved).count() - bumped.len();

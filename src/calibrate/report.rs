@@ -132,7 +132,7 @@ impl std::fmt::Display for Finding {
             Finding::UnseenCamera { camera } => write!(f, "camera `{camera}` saw nothing and was left out"),
             Finding::Misfit { ratio, stated } => write!(
                 f,
-                "errors are {ratio:.1} times the stated noise of {stated:.2}: the noise is larger, a lens model or a joint's kind \
+                "errors are {ratio:.1} times the stated noise of {stated}: the noise is larger, a lens model or a joint's kind \
                  is wrong, or the fit went astray"
             ),
             Finding::Outliers { count, of } => write!(f, "{count} of {of} detections do not fit and were left out"),

@@ -2,7 +2,7 @@
 use super::answer::Answer;
 use super::counts::learned_in_words;
 use super::folds::Folds;
-use super::inputs::{check_output, read_recordings_with_new, read_rig};
+use super::inputs::{check_output, is_same, read_recordings_with_new, read_rig};
 use super::noise;
 use super::progress::Bar;
 use super::trust;
@@ -76,8 +76,10 @@ impl Calibrate {
         let recording = read_recordings_with_new(&self.recordings, input.as_ref(), &self.relearn)?;
         check_output(&self.output, &self.recordings)?;
         if let Some(page) = &self.report {
-            check_output(page, &self.recordings)?;
-            if *page == self.output {
+            // Where the rig is learned into its own file, that is another output.
+            let rig = self.rig.iter().filter(|rig| !is_same(rig, &self.output)).cloned();
+            check_output(page, &self.recordings.iter().cloned().chain(rig).collect::<Vec<_>>())?;
+            if is_same(page, &self.output) {
                 return Err(Error::Unusable(format!("{}: given for two outputs", page.display())));
             }
         }

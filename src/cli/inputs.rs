@@ -68,6 +68,15 @@ fn mismatch(input: &RigInput, recording: &Recording, new: &[String]) -> Option<S
     Some(format!("camera `{name_of_it}` is not in the rig {name} (known: {known}){would_do}"))
 }
 
+/// True where two paths name one file, which need not exist yet.
+pub fn is_same(one: &Path, other: &Path) -> bool {
+    let place = |path: &Path| {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        path.canonicalize().ok().or_else(|| Some(folder.canonicalize().ok()?.join(path.file_name()?)))
+    };
+    one == other || place(one).is_some_and(|one| Some(one) == place(other))
+}
+
 /// Fails where an output could not be written, or would replace one of the inputs: before the work, not after it.
 pub fn check_output(path: &Path, inputs: &[PathBuf]) -> Result<(), Error> {
     let fails = |kind: io::ErrorKind| Err(Error::Io { path: path.to_owned(), source: kind.into() });

@@ -8,7 +8,7 @@ use handeye::Error;
 use handeye::calibrate::{SuggestOptions, SuggestedSample, Suggestion, suggest};
 use handeye::chain::JointKind;
 use handeye::recording::{RecordedCamera, Recording, Sample};
-use handeye::rig::Rig;
+use handeye::rig::{Camera, Rig};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -73,10 +73,15 @@ fn to_visit(rig: &Rig, suggestion: &Suggestion) -> Recording {
     let sample = |one: &SuggestedSample| Sample { joints: Some(one.joints.clone()), ..Sample::default() };
     Recording {
         joints: rig.robot.joints.iter().map(|joint| joint.name.clone()).collect(),
-        cameras: rig.cameras.iter().map(RecordedCamera::from).collect(),
+        // No lens: it would come back as known beforehand.
+        cameras: rig.cameras.iter().map(name_and_size).collect(),
         features: Vec::new(),
         samples: suggestion.samples.iter().map(sample).collect(),
     }
+}
+
+fn name_and_size(camera: &Camera) -> RecordedCamera {
+    RecordedCamera { name: camera.name.clone(), size: camera.size, ..RecordedCamera::default() }
 }
 
 fn text(rig: &Rig, suggestion: &Suggestion) -> String {
@@ -102,7 +107,7 @@ fn text(rig: &Rig, suggestion: &Suggestion) -> String {
     }
     let unit = if suggestion.metric { "" } else { "; nothing metric is known, so in the model's unit" };
     let mut text = format!(
-        "{} to record next, the most valuable first (rad; obstacles are not known):\n{positions}\n\
+        "{} to record next, the most valuable first (rad, or m where it says so; obstacles are not known):\n{positions}\n\
          what they would buy (standard deviation of the tip's position, median over the workspace{unit}):\n{bought}",
         count(suggestion.samples.len(), "joint position"),
     );

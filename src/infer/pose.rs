@@ -35,6 +35,15 @@ const ARRIVED: f64 = 1e-10;
 /// Poses with costs this far above the least are not worth mentioning: their probability is under 1e-8.
 const HOPELESS: f64 = 20.0;
 
+/// Adds a pose, or, of two that are the same, keeps the better.
+fn add(found: &mut Vec<(Pose, Normal)>, refined: (Pose, Normal)) {
+    match found.iter_mut().find(|(other, _)| other.angle_to(&refined.0) <= SAME) {
+        Some(same) if refined.1.cost < same.1.cost => *same = refined,
+        Some(_) => {}
+        None => found.push(refined),
+    }
+}
+
 /// Two poses whose rotations differ by less [rad] are one.
 const SAME: f64 = 1e-3;
 
@@ -59,15 +68,13 @@ pub(super) fn poses(views: &Views, seen: &Telling, n_joints: usize) -> Vec<Infer
         && found.first().is_none_or(|(_, normal)| !problem.is_plausible(normal))
         && let Some(start) = pose_from_rays(&group.points, &group.origins, &group.directions)
         && let Some(refined) = problem.refine(&group.tip(&start))
-        && found.iter().all(|(other, _)| other.angle_to(&refined.0) > SAME)
     {
-        found.push(refined);
+        add(&mut found, refined);
     }
-    if found.first().is_none_or(|(_, normal)| !problem.is_plausible(normal)) {
+    if !found.iter().any(|(_, normal)| problem.is_plausible(normal)) {
         for start in poses_from_rays(&group.points, &group.origins, &group.directions) {
-            let Some((pose, normal)) = problem.refine(&group.tip(&start)) else { continue };
-            if found.iter().all(|(other, _)| other.angle_to(&pose) > SAME) {
-                found.push((pose, normal));
+            if let Some(refined) = problem.refine(&group.tip(&start)) {
+                add(&mut found, refined);
             }
         }
     }

@@ -121,16 +121,16 @@ impl<'a> Motions<'a> {
             .map(|(name, most)| format!("camera `{name}` sees at most {most} of {n_features}"))
             .collect();
         let which = if blind.is_empty() { "no camera is to blame alone".to_owned() } else { blind.join(", ") };
-        let needed = if *per_camera > 0 {
-            format!("every camera has {per_camera} features in view")
-        } else if *in_one > 0 {
-            format!("a camera has {in_one} features in view")
-        } else {
-            format!("{in_total} features are in view")
-        };
+        let needs = [
+            (*per_camera, format!("every camera has {per_camera} features in view")),
+            (*in_one, format!("a camera has {in_one} features in view")),
+            (*in_total, format!("{in_total} features are in view")),
+        ];
+        let needed = needs.into_iter().filter(|(count, _)| *count > 0).map(|(_, words)| words);
+        let needed = needed.collect::<Vec<_>>().join(" and ");
         Error::NotEnoughData(format!(
-            "{} of {} random positions within the joints' limits are such that {needed}: {which}; cameras that look at \
-             the features, narrower limits or a smaller share in view would do",
+            "{} of {} random positions within the joints' ranges are such that {needed}: {which}; cameras that look at \
+             the features, or narrower limits of the joints, would do",
             self.found, self.tried
         ))
     }

@@ -32,7 +32,7 @@ struct Cone {
 /// Share of the largest angle at which a feature was seen that is counted on.
 const COUNTED_ON: f64 = 0.8;
 
-/// Steps towards the axis of a cone: it is off by the inverse of their number at most, in radii.
+/// Steps towards the axis of a cone: it is off by the inverse root of their number at most, in radii.
 const STEPS: u32 = 100;
 
 /// An angle at which a feature is seen that is seen at all [rad].

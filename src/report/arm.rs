@@ -1,8 +1,9 @@
 //! The view that can be turned: arm, cameras and features, where the rig puts them.
 use super::Subject;
 use super::page::Page;
+use super::residuals::{Placed, is_inner};
 use crate::Error;
-use crate::rig::{Model, Rig};
+use crate::rig::{Model, Parent, Rig};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
 use serde_json::{Value, json};
@@ -18,26 +19,31 @@ pub(super) fn view(page: &mut Page, subject: &Subject<'_>) -> Result<(), Error> 
     let samples = &subject.recording.samples;
     let of_sample = |sample: &crate::recording::Sample| {
         let joints = sample.joints.as_ref().filter(|joints| joints.len() == model.chain.len() && !joints.is_empty());
-        joints.map(|joints| model.links(joints)).or_else(|| sample.pose.map(|pose| vec![model.base, pose]))
+        let placed = joints.map(|joints| Placed { links: model.links(joints), is_tip_alone: false });
+        placed.or_else(|| sample.pose.map(|pose| Placed::by_tip(&model, pose)))
     };
-    let mut states: Vec<Vec<Pose>> = samples.iter().filter_map(of_sample).collect();
+    let mut states: Vec<Placed> = samples.iter().filter_map(of_sample).collect();
     if states.is_empty() {
-        states.push(model.links(&vec![0.0; model.chain.len()]));
+        states.push(Placed { links: model.links(&vec![0.0; model.chain.len()]), is_tip_alone: false });
     }
     let spread = |most: usize| (0..states.len()).step_by(states.len().div_ceil(most).max(1));
     let points = |links: &[Pose]| links.iter().map(|link| numbers(&link.translation)).collect::<Vec<_>>();
-    let tip = |links: &Vec<Pose>| links[links.len() - 1].translation;
+    let tip = |placed: &Placed| placed.links[placed.links.len() - 1].translation;
     let first = &states[0];
+    let is_placed = |parent: Parent| !(first.is_tip_alone && is_inner(parent, &model));
+    let features = model.features.iter().filter(|feature| is_placed(feature.parent));
     let features: Vec<Vector3<f64>> =
-        model.features.iter().map(|feature| model.carrier(feature.parent, first).transform(&feature.xyz)).collect();
-    let cameras: Vec<Pose> =
-        model.cameras.iter().map(|camera| model.carrier(camera.parent, first) * camera.pose).collect();
+        features.map(|feature| model.carrier(feature.parent, &first.links).transform(&feature.xyz)).collect();
+    let cameras: Vec<(usize, Pose)> = (model.cameras.iter().enumerate())
+        .filter(|(_, camera)| is_placed(camera.parent))
+        .map(|(index, camera)| (index, model.carrier(camera.parent, &first.links) * camera.pose))
+        .collect();
     let tips: Vec<Vector3<f64>> = spread(TIPS).map(|index| tip(&states[index])).collect();
     let all = || {
         tips.iter()
             .copied()
             .chain(features.iter().copied())
-            .chain(cameras.iter().map(|pose| pose.translation))
+            .chain(cameras.iter().map(|(_, pose)| pose.translation))
             .chain([model.base.translation])
     };
     let count = all().count() as f64;
@@ -50,10 +56,10 @@ pub(super) fn view(page: &mut Page, subject: &Subject<'_>) -> Result<(), Error> 
     let data = json!({
         "centre": numbers(&centre),
         "radius": radius,
-        "arms": spread(ARMS + 1).map(|index| points(&states[index])).collect::<Vec<_>>(),
+        "arms": spread(ARMS + 1).map(|index| points(&states[index].links)).collect::<Vec<_>>(),
         "tips": tips.iter().map(numbers).collect::<Vec<_>>(),
         "features": features.iter().map(numbers).collect::<Vec<_>>(),
-        "cameras": cameras.iter().enumerate().map(|(index, pose)| frustum(rig, index, pose, 0.15 * radius)).collect::<Vec<_>>(),
+        "cameras": cameras.iter().map(|(index, pose)| frustum(rig, *index, pose, 0.15 * radius)).collect::<Vec<_>>(),
         "axes": (0..3).map(axis).collect::<Vec<_>>(),
     });
     page.section("view-section", "Where everything is");

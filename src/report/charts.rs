@@ -1,6 +1,6 @@
 //! The drawings: each a function from numbers to SVG whose colours are the page's.
-use super::page::escaped;
 use super::residuals::Residual;
+use crate::svg::{escaped, points};
 use std::fmt::Write;
 
 /// Points that a drawing shows at most: more is a blot, and a heavy page.
@@ -81,9 +81,8 @@ pub(super) fn histogram(
         );
     }
     if !curve.is_empty() {
-        let points: Vec<String> =
-            curve.iter().map(|(at, density)| format!("{:.1},{:.1}", x(*at), y(*density))).collect();
-        let _ = write!(svg, "<polyline class=\"expected\" points=\"{}\"/>", points.join(" "));
+        let line = points(curve.iter().map(|(at, density)| [x(*at), y(*density)]));
+        let _ = write!(svg, "<polyline class=\"expected\" points=\"{line}\"/>");
     }
     let _ = write!(svg, "<path class=\"axis\" d=\"M{left} {0}H{1}\"/>", top + height, left + width);
     for tick in 0..=4 {

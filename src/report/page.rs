@@ -1,4 +1,5 @@
 //! The page: its frame, its style, and the pieces that it is built from.
+use crate::svg::escaped;
 use std::fmt::Write;
 
 const STYLE: &str = include_str!("style.css");
@@ -109,9 +110,4 @@ impl Page {
         self.close();
         self.body + "</main>\n</body>\n</html>\n"
     }
-}
-
-/// Text that HTML takes for text.
-pub(super) fn escaped(words: &str) -> String {
-    words.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

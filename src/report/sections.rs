@@ -5,6 +5,7 @@ use super::residuals::Residual;
 use super::{ExtraTable, Subject};
 use crate::calibrate::{CameraErrors, DeterminedBy, Finding, median};
 use crate::chain::JointKind;
+use crate::rig::Rig;
 
 /// Worst samples that are listed, and whose images are drawn.
 const WORST: usize = 10;
@@ -30,7 +31,7 @@ pub(super) fn summary(page: &mut Page, subject: &Subject<'_>) {
             if tip.metric {
                 "standard deviation of the tip's position"
             } else {
-                "the same of the tip, in the model's unit"
+                "standard deviation of the tip's position, in the model's unit: nothing metric is known"
             },
         ));
     }
@@ -67,8 +68,9 @@ pub(super) fn cameras(page: &mut Page, subject: &Subject<'_>, residuals: &[Resid
     let mut header = vec!["camera", "detections", "left out", "rms px", "mean px", "median px", "largest px"];
     header.extend(["points", "rms mm"].into_iter().filter(|_| has_points));
     page.table(&header, rows.iter().map(Vec::as_slice));
-    let sd = scale(report.median_px);
+    let sds = scales(rig, residuals);
     for (index, camera) in rig.cameras.iter().enumerate() {
+        let sd = sds[index];
         let own: Vec<&Residual> = residuals.iter().filter(|residual| residual.camera == index).collect();
         if own.is_empty() {
             continue;
@@ -90,9 +92,13 @@ pub(super) fn cameras(page: &mut Page, subject: &Subject<'_>, residuals: &[Resid
     }
 }
 
-/// Standard deviation of a coordinate, from the median distance of Gaussian residuals [px].
-fn scale(median_px: f64) -> f64 {
-    (median_px / (2.0 * std::f64::consts::LN_2).sqrt()).max(1e-6)
+/// Standard deviation of a coordinate in every camera of a rig, from the median distance of Gaussian residuals [px].
+fn scales(rig: &Rig, residuals: &[Residual]) -> Vec<f64> {
+    let of = |camera: usize| {
+        let own = residuals.iter().filter(|residual| residual.camera == camera);
+        (median(&mut own.map(Residual::distance).collect::<Vec<_>>()) / (2.0 * std::f64::consts::LN_2).sqrt()).max(1e-6)
+    };
+    (0..rig.cameras.len()).map(of).collect()
 }
 
 /// As large as what was seen.
@@ -106,13 +112,14 @@ pub(super) fn histogram_of(page: &mut Page, subject: &Subject<'_>, residuals: &[
     if residuals.is_empty() {
         return;
     }
-    let sd = scale(subject.calibration.report.median_px);
-    let coordinates: Vec<f64> = residuals.iter().flat_map(|residual| residual.error).map(|error| error / sd).collect();
+    let sds = scales(&subject.calibration.rig, residuals);
+    let over_sd = |residual: &Residual| residual.error.map(|error| error / sds[residual.camera]);
+    let coordinates: Vec<f64> = residuals.iter().flat_map(over_sd).collect();
     let gaussian = |x: f64| (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt();
     page.section("histogram", "Are the errors noise?");
     page.drawing(
         &histogram(&coordinates, [-5.0, 5.0], 50, Some(&gaussian)),
-        "residual coordinates over their standard deviation, and the curve that noise alone would give; what lies beyond 5 is counted at the ends",
+        "residual coordinates over the standard deviation of their camera, and the curve that noise alone would give; what lies beyond 5 is counted at the ends",
     );
 }
 
@@ -128,9 +135,9 @@ pub(super) fn worst(page: &mut Page, subject: &Subject<'_>, residuals: &[Residua
         return;
     }
     page.section("worst", "The samples that fit worst");
-    let far = 6.0 * scale(subject.calibration.report.median_px);
+    let sds = scales(&subject.calibration.rig, residuals);
     let row = |(of_sample, median_px): &(&[Residual], f64)| {
-        let n_far = of_sample.iter().filter(|residual| residual.distance() > far).count();
+        let n_far = of_sample.iter().filter(|residual| residual.distance() > 6.0 * sds[residual.camera]).count();
         vec![of_sample[0].sample.to_string(), format!("{median_px:.3}"), of_sample.len().to_string(), n_far.to_string()]
     };
     let rows: Vec<Vec<String>> = samples.iter().map(row).collect();

@@ -1,4 +1,4 @@
-// Arm, cameras and features: drag to turn, wheel or pinch to come nearer, arrow keys to turn.
+// Arm, cameras and features: drag or arrow keys to turn, wheel to come nearer.
 (() => {
   const canvas = document.getElementById("view");
   const scene = JSON.parse(document.getElementById("view-data").textContent);
@@ -43,7 +43,7 @@
   };
   let held = null;
   canvas.addEventListener("pointerdown", (event) => { held = [event.clientX, event.clientY]; canvas.setPointerCapture(event.pointerId); });
-  canvas.addEventListener("pointerup", () => { held = null; });
+  ["pointerup", "pointercancel"].forEach((end) => canvas.addEventListener(end, () => { held = null; }));
   canvas.addEventListener("pointermove", (event) => {
     if (!held) return;
     yaw -= (event.clientX - held[0]) * 0.01;

@@ -2,7 +2,7 @@
 use crate::cli::Folder;
 use handeye::calibrate::{Options, calibrate};
 use handeye::report::{Subject, html, residuals};
-use handeye::rig::{Rig, catalog};
+use handeye::rig::{Parent, Rig, catalog};
 use handeye::simulate::{SimulateOptions, simulate};
 use serde_json::Value;
 use std::ops::ControlFlow;
@@ -102,4 +102,32 @@ fn a_page_is_not_written_over_an_input_or_the_rig() {
         assert!(complaint.contains(message), "{complaint}");
     }
     assert_eq!(folder.names(), ["motions.jsonl"]);
+    folder.write("arm.toml", "name = \"precious\"\n");
+    for arguments in [
+        "calibrate motions.jsonl --rig arm.toml -o out.toml --report arm.toml",
+        "calibrate motions.jsonl --rig arm.toml -o arm.toml --report ./arm.toml",
+        "calibrate motions.jsonl -o out.toml --report ./out.toml",
+    ] {
+        let (_, complaint) = folder.expect(2, arguments);
+        assert!(complaint.contains("is an input too") || complaint.contains("two outputs"), "{arguments}\n{complaint}");
+    }
+    assert_eq!(folder.read("arm.toml"), "name = \"precious\"\n");
+}
+
+/// Of samples with nothing but a tip pose, features on inner links are nowhere.
+#[test]
+fn a_page_of_samples_without_joints_leaves_out_what_hangs_on_inner_links() {
+    let mut truth = catalog::rig("ur5").unwrap();
+    truth.features[0].parent = Parent::Link(2);
+    let simulated = simulate(&truth, &SimulateOptions { samples: 20, ..SimulateOptions::default() }).unwrap();
+    let learned =
+        calibrate(&truth, &simulated.recording, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap();
+    let mut recording = simulated.recording.clone();
+    for (sample, exact) in recording.samples.iter_mut().zip(&simulated.truth.samples) {
+        (sample.joints, sample.pose) = (None, exact.pose);
+    }
+    let all = residuals(&learned.rig, &recording).unwrap();
+    assert!(!all.is_empty() && all.iter().all(|residual| residual.feature != 0 && residual.distance() < 3.0));
+    let subject = Subject { title: "tips", before: &truth, calibration: &learned, recording: &recording, tables: &[] };
+    assert!(html(&subject).unwrap().contains("<h2>Where everything is</h2>"));
 }

@@ -4,7 +4,7 @@ use crate::learning::{learn, nothing, record, variants};
 use handeye::Error;
 use handeye::calibrate::{Calibration, SuggestOptions, Suggestion, suggest};
 use handeye::chain::JointKind;
-use handeye::recording::Recording;
+use handeye::recording::{Detection, Recording};
 use handeye::rig::{Limits, Model, Rig};
 use handeye::simulate::random_rig;
 use nalgebra::Vector3;
@@ -173,8 +173,8 @@ fn every_kind_of_rig_gets_what_is_said_inside_its_limits_and_in_view() {
 #[test]
 fn nobody_is_sent_to_see_the_back_of_a_board() {
     let normal = Vector3::new(-0.3, 0.0, 1.0).normalize();
-    let mut hidden = 0;
-    for seed in 1..=5 {
+    let (mut hidden, mut tried) = (0, 0);
+    for seed in 1..=8 {
         let truth = variants::planar(2, seed);
         let model = Model::new(&truth).unwrap();
         let shows = |joints: &[f64], camera: usize, feature: usize| {
@@ -189,6 +189,13 @@ fn nobody_is_sent_to_see_the_back_of_a_board() {
             let joints = sample.joints.clone().unwrap();
             sample.pixels.retain(|seen| shows(&joints, seen.camera as usize, feature(seen.feature)));
         }
+        // Where a board faces away nearly always, nothing is learned.
+        let seen =
+            |camera| recording.samples.iter().flat_map(|one| &one.pixels).filter(move |one| one.camera == camera);
+        if (0..2).any(|camera| seen(camera).count() < 100) {
+            continue;
+        }
+        tried += 1;
         let start = variants::nominal(&truth);
         let learned = learn(&start, &recording).unwrap().rig;
         let blind_to = |recording: Option<&Recording>| {
@@ -207,7 +214,7 @@ fn nobody_is_sent_to_see_the_back_of_a_board() {
         assert_eq!(blind_to(Some(&recording)), 0, "seed {seed}");
         hidden += blind_to(None);
     }
-    assert!(hidden > 0, "the fixture hides nothing");
+    assert!(hidden > 0 && tried >= 5, "the fixture hides nothing: {hidden} of {tried}");
 }
 
 #[test]
@@ -295,6 +302,19 @@ fn the_command_lists_positions_writes_them_for_the_robot_and_says_what_they_buy(
     }
     let to_visit = Recording::read(&folder.path().join("next.jsonl")).unwrap();
     assert_eq!((to_visit.samples.len(), to_visit.joints.len(), to_visit.cameras.len()), (2, 6, 2));
+    // The robot goes there, and both recordings are one.
+    let mut visited = to_visit.clone();
+    let ur5 = handeye::rig::catalog::rig("ur5").unwrap();
+    visited.features = ur5.features.iter().map(|feature| feature.name.clone()).collect();
+    let model = Model::new(&ur5).unwrap();
+    for sample in &mut visited.samples {
+        for (camera, feature, pixel) in in_view(&model, &ur5, sample.joints.as_ref().unwrap()) {
+            sample.pixels.push(Detection { camera: camera as u32, feature: feature as u32, pixel });
+        }
+    }
+    visited.write(&folder.path().join("visited.jsonl")).unwrap();
+    let (both, _) = folder.expect(0, "calibrate motions.jsonl visited.jsonl -o both.toml");
+    assert!(both.contains("14 samples"), "{both}");
     let (json, _) = folder.expect(0, "suggest learned.toml --count 2 --with motions.jsonl --json");
     let json: Value = serde_json::from_str(&json).unwrap();
     let joints: Vec<f64> =

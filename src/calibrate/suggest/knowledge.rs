@@ -46,7 +46,7 @@ impl Uncertainty {
         }
         let is_open = |error| {
             Error::NotEnoughData(format!(
-                "the recording leaves something of the rig open, so that no motion can be weighed against another ({error}): \\
+                "the recording leaves something of the rig open, so that no motion can be weighed against another ({error}): \
                  calibrate says what, and what would help"
             ))
         };

@@ -1,9 +1,10 @@
 //! What was known before a rig was learned, and where its fit ended.
 use super::super::graph::{Freedom, State, row};
 use super::super::numbers::{Numbers, Part};
+use super::super::outliers::Verdict;
 use super::super::setup::Setup;
 use crate::Error;
-use crate::rig::{CameraField, Fit, JointField, Model, Parameter, Rig};
+use crate::rig::{Camera, CameraField, Fit, JointField, Model, Parameter, Rig};
 use std::collections::BTreeSet;
 
 /// The rig without what it learned: names, limits, parents and models stay, and the values that `[estimate]` speaks of.
@@ -30,21 +31,47 @@ pub(super) fn start(setup: &Setup, learned: &Rig) -> Result<State, Error> {
             "the learned rig has no {what} `{name}`, which the recording has: it was learned from another one"
         ))
     };
+    let moved = |what: &str, name: &str| {
+        Error::Unusable(format!("{what} `{name}` of what was known is fixed to something else than in the learned rig"))
+    };
     for camera in &mut rig.cameras {
         let found = learned.cameras.iter().find(|learned| learned.name == camera.name);
-        *camera = found.ok_or_else(|| lacks("camera", &camera.name))?.clone();
+        let found = found.ok_or_else(|| lacks("camera", &camera.name))?;
+        if found.parent != camera.parent {
+            return Err(moved("camera", &camera.name));
+        }
+        *camera = found.clone();
     }
     for feature in &mut rig.features {
         let found = learned.features.iter().find(|learned| learned.name == feature.name);
-        *feature = found.ok_or_else(|| lacks("feature", &feature.name))?.clone();
+        let found = found.ok_or_else(|| lacks("feature", &feature.name))?;
+        if found.parent != feature.parent {
+            return Err(moved("feature", &feature.name));
+        }
+        *feature = found.clone();
     }
     let mut state = State::new(setup);
     state.model = Model::new(&rig)?;
     Ok(state)
 }
 
-/// What is free now must be what was free when the rig was learned, which is what has a standard deviation.
-pub(super) fn check_freedom(setup: &Setup, freedom: &Freedom, fit: &Fit) -> Result<(), Error> {
+/// Leaves out cameras that the fit left out: neither placed beforehand nor learned, they saw too little or were found to have been moved.
+pub(super) fn leave_out_unused(setup: &Setup, freedom: &mut Freedom, verdict: &mut Verdict, fit: &Fit) {
+    let is_unused = |camera: &Camera| {
+        let number = format!("cameras.{}.", camera.name);
+        camera.pose.is_none() && !fit.sd.keys().any(|path| path.starts_with(&number))
+    };
+    for (index, _) in setup.rig.cameras.iter().enumerate().filter(|(_, camera)| is_unused(camera)) {
+        freedom.cameras[index] = [true; 6];
+        freedom.intrinsics[index] = [true; 12];
+        let seen = setup.observations.iter().zip(&mut verdict.active).filter(|(seen, _)| seen.camera == index);
+        seen.for_each(|(_, active)| *active = false);
+    }
+}
+
+/// What is free now must be what was free when the rig was learned, which is what has a standard deviation. `is_given`: what was known is
+/// a rig that the user named.
+pub(super) fn check_freedom(setup: &Setup, freedom: &Freedom, fit: &Fit, is_given: bool) -> Result<(), Error> {
     if fit.sd.is_empty() {
         return Err(Error::NotEnoughData(
             "the rig has no standard deviations in [fit.sd]: what it was learned from leaves something open, which `gauge` names"
@@ -66,7 +93,9 @@ pub(super) fn check_freedom(setup: &Setup, freedom: &Freedom, fit: &Fit) -> Resu
     match now.symmetric_difference(&then).next() {
         None => Ok(()),
         Some(path) => {
-            let problem = if then.contains(path) {
+            let problem = if is_given {
+                "is free in one of the given rig and the learned one, and held in the other: that is not the rig that learning started from"
+            } else if then.contains(path) {
                 "was free when the rig was learned, and is held where nothing is known beforehand: give the rig that learning \
                  started from (--rig)"
             } else {

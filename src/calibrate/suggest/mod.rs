@@ -131,10 +131,9 @@ pub fn suggest(
     let mut observer = |_: &super::Progress<'_>| ControlFlow::Continue(());
     let mut stages = Stages::new(&setup, &priors, &mut observer);
     let start = known::start(&setup, learned)?;
-    let Fitted { state, freedom, verdict, loss, .. } = fit(&mut stages, Some(start), options.seed)?;
-    if known.is_none() {
-        known::check_freedom(&setup, &freedom, fit_of)?;
-    }
+    let Fitted { state, mut freedom, mut verdict, loss, .. } = fit(&mut stages, Some(start), options.seed)?;
+    known::leave_out_unused(&setup, &mut freedom, &mut verdict, fit_of);
+    known::check_freedom(&setup, &freedom, fit_of, known.is_some())?;
     let takes_part = |index: usize| verdict.active[index];
     let last = Stage { name: LAST, freedom: &freedom, loss, takes_part: &takes_part };
     let honest = Honest::new(&stages, &last, &state, &verdict);

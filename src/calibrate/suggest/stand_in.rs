@@ -7,13 +7,13 @@ use crate::rig::{Fit, Model, Noise, Rig};
 use rand::RngExt;
 use std::borrow::Cow;
 
-/// Samples at most; of more, fewer with less noise tell as much.
+/// Samples at most; of more, fewer with less noise of pixels and joints tell as much.
 const MOST: usize = 500;
 
 /// What a rig was learned from.
 pub(super) struct Data<'a> {
     pub recording: Cow<'a, Recording>,
-    /// With that of the pixels lowered by the root of `thinned`.
+    /// With those of pixels and joints lowered by the root of `thinned`.
     pub noise: Noise,
     /// Samples of the recording as a share of those that it stands for.
     pub thinned: f64,
@@ -23,8 +23,9 @@ pub(super) struct Data<'a> {
 pub(super) fn stand_in(learned: &Rig, fit: &Fit, seed: u64) -> Result<Data<'static>, Error> {
     let model = Model::new(learned)?;
     let views = Views::new(learned, &model, need(learned))?;
-    let ranges =
-        if fit.joints.len() == learned.robot.joints.len() { fit.joints.clone() } else { ranges(learned, fit)? };
+    let is_range = |[least, most]: &[f64; 2]| least <= most && (most - least).is_finite();
+    let is_known = fit.joints.len() == learned.robot.joints.len() && fit.joints.iter().all(is_range);
+    let ranges = if is_known { fit.joints.clone() } else { ranges(learned, fit)? };
     let mut motions = Motions::new(learned, &views, ranges, stream(seed, STAND_IN));
     let samples = fit.samples.clamp(1, MOST);
     let mut recording = Recording {
@@ -46,5 +47,6 @@ pub(super) fn stand_in(learned: &Rig, fit: &Fit, seed: u64) -> Result<Data<'stat
     pixels.for_each(|pixels| pixels.retain(|_| random.random::<f64>() < detected));
     let mut noise = learned.noise;
     noise.pixels = noise.pixels.max(fit.rms_px / 2.0_f64.sqrt()) * thinned.sqrt();
+    noise.joints *= thinned.sqrt();
     Ok(Data { recording: Cow::Owned(recording), noise, thinned })
 }

@@ -18,7 +18,7 @@ type Points = BTreeMap<usize, Vector3<f64>>;
 /// cameras share enough.
 pub(super) fn reconstruct(views: &Views<'_>) -> Vec<Scene> {
     match from_depth(views) {
-        Some(scene) if scene.is_whole() => vec![scene],
+        Some(scene) if scene.is_whole(views) => vec![scene],
         scene => scene.into_iter().chain(from_pair(views)).collect(),
     }
 }

@@ -47,9 +47,10 @@ pub(crate) fn reconstruct(views: &Views<'_>) -> Vec<Scene> {
 }
 
 impl Scene {
-    /// True where every camera and every sample is placed.
-    fn is_whole(&self) -> bool {
-        self.cameras.iter().all(Option::is_some) && self.objects.iter().all(Option::is_some)
+    /// True where every camera, and every sample in which something was seen, is placed.
+    fn is_whole(&self, views: &Views<'_>) -> bool {
+        let mut samples = views.samples.iter().zip(&self.objects);
+        self.cameras.iter().all(Option::is_some) && samples.all(|(seen, placed)| seen.is_empty() || placed.is_some())
     }
 
     fn empty(views: &Views<'_>) -> Scene {
