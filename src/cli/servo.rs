@@ -62,7 +62,8 @@ impl Servo {
         }
         let words = run.stop.words(&input.rig, &run.limits);
         let mut answer = Answer::new(text(&title, &run, &words), to_json(&run, &words, &input.rig));
-        let is_over = matches!(run.stop, Stop::TimedOut { .. }) && scene.settings.follow;
+        // Who follows a target goes on to the end of the time.
+        let is_over = matches!(run.stop, Stop::TimedOut { error_px: Some(_), .. }) && scene.settings.follow;
         if !run.stop.is_success() && !is_over {
             answer.failure = Some(words);
         }
@@ -119,7 +120,8 @@ fn to_json(run: &Run, words: &str, rig: &Rig) -> Value {
             "error_px": moment.error_px,
             "error_m": moment.error_m,
             "joints": moment.joints,
-            "active": moment.active.iter().map(|active| active.words(rig, &run.limits)).collect::<Vec<_>>(),
+            "active": moment.active.iter().map(|active| active.constraint.words(rig, &run.limits)).collect::<Vec<_>>(),
+            "conflict": moment.conflict.iter().map(|constraint| constraint.words(rig, &run.limits)).collect::<Vec<_>>(),
             "moves": moment.command != Command::Hold,
             "waits": moment.waits,
         })

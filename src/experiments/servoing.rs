@@ -113,7 +113,7 @@ fn floor(world: &mut World, command: &Command, target: &[f64]) -> Result<f64, Er
     Ok(sum / TARGETS as f64)
 }
 
-/// Over the features that are in view in both.
+/// Over the features that are in view in both; NaN where there is none.
 fn distance(seen: &[Detection], goal: &[Detection]) -> f64 {
     let key = |detection: &Detection| (detection.camera, detection.feature);
     let (mut sum, mut count) = (0.0, 0.0);

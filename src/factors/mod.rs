@@ -1,5 +1,6 @@
 //! Residuals and derived nodes of the generative model; one file each.
 mod forward_kinematics;
+mod in_camera;
 mod joint_action;
 mod joint_reading;
 mod point_observation;
@@ -10,9 +11,10 @@ mod reprojection;
 mod target;
 
 pub use forward_kinematics::ForwardKinematics;
+pub use in_camera::InCamera;
 pub use joint_action::JointAction;
 pub use joint_reading::JointReading;
-pub use point_observation::{InCamera, PointObservation};
+pub use point_observation::PointObservation;
 pub use pose_action::{Motion, PoseAction};
 pub use pose_reading::PoseReading;
 pub use readings::{JointReadings, Polynomial, PoseReadings};

@@ -1,7 +1,9 @@
 //! The reprojection error of one feature in one image (eqs. 2 and 6 of the paper).
+use super::InCamera;
+use super::in_camera::Sightline;
 use crate::camera::{CameraModel, PARAMETERS};
 use handeye_solvers::scalar::{Dual, derivatives, seed};
-use handeye_solvers::{Factor, Jacobian, Pose, Scalar, Vector};
+use handeye_solvers::{Factor, Function, Jacobian, Pose, Scalar, Vector};
 use nalgebra::Vector3;
 
 /// fx, fy, cx, cy [px] and 8 distortion coefficients, of which a camera model uses the first few.
@@ -28,8 +30,7 @@ impl Factor<2> for Reprojection {
         &self,
         (carrier, feature, mount, camera, intrinsics): (Pose<T>, Vector<3, T>, Pose<T>, Pose<T>, Vector<PARAMETERS, T>),
     ) -> [T; 2] {
-        let in_world = carrier.transform(&feature);
-        let in_camera = camera.inverse_transform(&mount.inverse_transform(&in_world));
+        let in_camera = InCamera.compute((carrier, feature, mount, camera));
         let [u, v] = self.model.project(&intrinsics.data.0[0], &in_camera);
         [u - self.pixel[0], v - self.pixel[1]]
     }
@@ -37,11 +38,8 @@ impl Factor<2> for Reprojection {
     /// Dual numbers through the lens only; the rest is the chain rule of rigid motion.
     #[inline]
     fn evaluate(&self, x: &[&[f64]], jacobian: Option<&mut Jacobian<'_>>) -> [f64; 2] {
-        let [carrier, mount, camera] = [x[0], x[2], x[3]].map(Pose::from_stored);
-        let arm = carrier.rotation * Vector3::new(x[1][0], x[1][1], x[1][2]);
-        let from_mount = arm + carrier.translation - mount.translation;
-        let from_camera = mount.rotation.tr_mul(&from_mount) - camera.translation;
-        let in_camera = camera.rotation.tr_mul(&from_camera);
+        let sightline = Sightline::new(x);
+        let in_camera = sightline.in_camera;
         let [fx, fy, cx, cy] = [x[4][0], x[4][1], x[4][2], x[4][3]];
         let distortion = &x[4][4..];
         let pixel = |[a, b]: [f64; 2]| [fx * a + cx - self.pixel[0], fy * b + cy - self.pixel[1]];
@@ -60,21 +58,7 @@ impl Factor<2> for Reprojection {
         };
         for (row, focal) in [fx, fy].into_iter().enumerate() {
             let [a, b, c] = by_point[row].map(|slope| focal * slope);
-            // The row with respect to a point: in the camera, in the frame that carries it, in the world.
-            let in_mount = camera.rotation * Vector3::new(a, b, c);
-            let in_world = mount.rotation * in_mount;
-            if jacobian.wanted(0) {
-                write(jacobian.row(row, 0), arm.cross(&in_world), in_world);
-            }
-            if jacobian.wanted(1) {
-                jacobian.row(row, 1).copy_from_slice(carrier.rotation.tr_mul(&in_world).as_slice());
-            }
-            if jacobian.wanted(2) {
-                write(jacobian.row(row, 2), in_world.cross(&from_mount), -in_world);
-            }
-            if jacobian.wanted(3) {
-                write(jacobian.row(row, 3), in_mount.cross(&from_camera), -in_mount);
-            }
+            sightline.write(jacobian, row, &Vector3::new(a, b, c));
             if jacobian.wanted(4) {
                 let columns = jacobian.row(row, 4);
                 columns.copy_from_slice(&[0.0; PARAMETERS]);
@@ -105,10 +89,4 @@ fn lens<const N: usize>(model: CameraModel, distortion: &[f64], in_camera: &Vect
         model.lens(&coefficients, &point)
     };
     (lifted.map(|value| value.value()), lifted.map(|value| derivatives(&value)))
-}
-
-/// A row by a pose's step: its rotation, then its translation.
-#[inline]
-pub(super) fn write(columns: &mut [f64], w: Vector3<f64>, v: Vector3<f64>) {
-    columns.copy_from_slice(&[w.x, w.y, w.z, v.x, v.y, v.z]);
 }

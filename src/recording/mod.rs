@@ -1,10 +1,12 @@
 //! Recordings: what was commanded, read and seen; one file per format.
+mod command;
 mod join;
 mod jsonl;
 mod names;
 mod select;
 mod types;
 
+pub use command::Command;
 pub use jsonl::Reader;
 pub(crate) use names::natural_order;
 pub use types::*;

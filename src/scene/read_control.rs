@@ -27,7 +27,10 @@ pub(super) fn read_control(node: Node) -> Result<Control, Error> {
         "image-based" => Control::ImageBased(ImageSettings { matrix, gain, infer_joints, ..ImageSettings::default() }),
         "pose-based" => Control::PoseBased(PoseSettings { matrix, gain, infer_joints, ..PoseSettings::default() }),
         "model-based-tip" => {
-            let speed = fields.optional("speed", |node| node.numbers::<2>())?;
+            let speed = fields.optional("speed", |node| match node.numbers::<2>()? {
+                speed if speed.iter().all(|speed| *speed > 0.0) => Ok(speed),
+                _ => Err(node.error("must be two numbers above 0: m/s and rad/s")),
+            })?;
             Control::ModelBasedTip { speed: speed.unwrap_or([f64::INFINITY; 2]) }
         }
         _ => Control::ModelBased,

@@ -6,7 +6,7 @@ use crate::recording::{Detection, Recording, Sample};
 use crate::rig::Rig;
 use crate::servo::limits::{HalfSpace, InImage, PixelSpeed, TipBox, TipSpeed, VirtualFixture};
 use crate::servo::{
-    Active, Command, Controller, ImageBased, Limit, LoopSettings, Measurement, ModelBased, ModelBasedTip, PoseBased,
+    Active, Command, Constraint, Controller, ImageBased, Limit, Measurement, ModelBased, ModelBasedTip, PoseBased,
     ServoLoop, Stop, Takes,
 };
 use crate::simulate::world::World;
@@ -45,6 +45,8 @@ pub struct Moment {
     pub goal: Vec<Detection>,
     /// What holds the motion back.
     pub active: Vec<Active>,
+    /// Constraints that cannot all hold, where a limit gave way.
+    pub conflict: Vec<Constraint>,
     /// What the robot was told.
     pub command: Command,
     /// Why it waits, where it does.
@@ -92,7 +94,7 @@ fn run_with<C: Controller>(
     watch: &mut dyn FnMut(&Moment) -> ControlFlow<()>,
 ) -> Result<Run, Error> {
     let truth = scene.rig.as_ref().unwrap_or(known);
-    check(truth, scene)?;
+    check(truth, known, scene)?;
     let mut world = World::new(truth, &scene.start, scene.world.clone())?;
     let names = Names::new(known, world.header());
     let (limit_names, limits): (Vec<String>, Vec<Box<dyn Limit>>) = scene.limits(known).into_iter().unzip();
@@ -116,6 +118,7 @@ fn run_with<C: Controller>(
             pixels: sample.pixels,
             goal,
             active: tick.active,
+            conflict: tick.conflict,
             command: tick.command,
             waits: tick.waits,
         };
@@ -136,8 +139,8 @@ fn sightings(names: &Names, pixels: &[Detection]) -> Vec<Sighting> {
     names.sightings(&Sample { pixels: pixels.to_vec(), ..Sample::default() })
 }
 
-/// That a scene fits its true rig, and ends.
-fn check(truth: &Rig, scene: &Scene) -> Result<(), Error> {
+/// That a scene fits its true rig and the one that is known, that nothing in it is without effect, and that it ends.
+fn check(truth: &Rig, known: &Rig, scene: &Scene) -> Result<(), Error> {
     let n = truth.robot.joints.len();
     let lists = [
         ("start", scene.start.len()),
@@ -149,12 +152,34 @@ fn check(truth: &Rig, scene: &Scene) -> Result<(), Error> {
             return Err(Error::Unusable(format!("`{name}` of the scene has {found} numbers, the rig has {n} joints")));
         }
     }
-    let LoopSettings { timeout, .. } = scene.settings;
-    let ticks = timeout / scene.dt;
+    let images = scene.limits.iter().find(|(_, kind)| matches!(kind, LimitKind::InImage(_)));
+    if let (Some((limit, _)), Some(camera)) = (images, known.cameras.iter().find(|camera| camera.size.is_none())) {
+        return Err(Error::Unusable(format!(
+            "limit `{limit}`: camera `{}` of the known rig has no `size`, so nothing says where its images end",
+            camera.name
+        )));
+    }
+    let execution = &scene.world.execution;
+    let moves_tip = matches!(scene.takes, Takes::PoseDelta | Takes::PoseVelocity);
+    let without_effect = [
+        ("pose", execution.pose.is_noisy() && !moves_tip),
+        ("joints", execution.joints > 0.0 && moves_tip),
+        ("gain", !execution.gain.is_empty() && moves_tip),
+    ];
+    if let Some((key, _)) = without_effect.iter().find(|(_, is_idle)| *is_idle) {
+        let takes = scene.takes.name();
+        return Err(Error::Unusable(format!(
+            "`{key}` of the scene's `execution` has no effect on a robot that takes {takes}"
+        )));
+    }
+    let (timeout, dt) = (scene.settings.timeout, scene.dt);
+    if !(dt > 0.0 && dt.is_finite()) {
+        return Err(Error::Unusable(format!("a scene cannot go on in steps of {dt} s")));
+    }
+    let ticks = timeout / dt;
     if ticks > MOST_TICKS {
         return Err(Error::Unusable(format!(
-            "a loop of {timeout} s in steps of {} s would have {ticks:.0} steps, at most {MOST_TICKS} are run",
-            scene.dt
+            "a loop of {timeout} s in steps of {dt} s would have {ticks:.0} steps, at most {MOST_TICKS} are run"
         )));
     }
     Ok(())

@@ -1,8 +1,8 @@
 //! What a closed loop asks of a controller.
-use super::{Active, Arm, Configuration, Limit, Step, Takes};
+use super::{Active, Arm, Configuration, Constraint, Limit, Step, Takes};
 use crate::Error;
 use crate::infer::Sighting;
-use crate::simulate::world::Command;
+use crate::recording::Command;
 
 /// What was read and seen at a moment.
 #[derive(Clone, Copy, Debug)]
@@ -22,13 +22,22 @@ pub struct Decision {
     pub command: Command,
     /// What holds it back.
     pub active: Vec<Active>,
+    /// Constraints that cannot all hold, where a limit gave way; see [`Step::conflict`].
+    pub conflict: Vec<Constraint>,
 }
 
 impl Decision {
-    /// A joint motion, as what the robot takes; a step that failed holds the robot.
-    pub fn new(takes: Takes, arm: &Arm, at: &Configuration, step: &Step, dt: f64) -> Self {
-        let command = if step.failed { Command::Hold } else { takes.command(arm, at, &step.motion, dt) };
-        Decision { command, active: step.active.clone() }
+    /// A joint motion, as what the robot takes.
+    ///
+    /// Errors: [`Error::NotEnoughData`] for a step that failed, whose motion is worth nothing.
+    pub fn new(takes: Takes, arm: &Arm, at: &Configuration, step: &Step, dt: f64) -> Result<Self, Error> {
+        if step.failed {
+            return Err(Error::NotEnoughData(
+                "the numbers of a step were not finite, or its program broke down".to_owned(),
+            ));
+        }
+        let command = takes.command(arm, at, &step.motion, dt);
+        Ok(Decision { command, active: step.active.clone(), conflict: step.conflict.clone() })
     }
 }
 
@@ -42,4 +51,7 @@ pub trait Controller {
     /// Errors: [`Error::NotEnoughData`] where what is seen determines no motion, after which the loop waits for the next measurement;
     /// any other error ends it.
     fn decide(&mut self, now: &Measurement<'_>, limits: &[&dyn Limit], dt: f64) -> Result<Decision, Error>;
+
+    /// Told when the robot is held in place of a command: it stands still from now on.
+    fn held(&mut self) {}
 }

@@ -10,7 +10,7 @@ pub enum Gain {
     Constant(f64),
     /// Small where the error x is large and large near the goal, where a constant gain would either start too fast or end too slowly:
     ///
-    ///   λ(x) = (λ₀ - λ∞) exp(-s x / (λ₀ - λ∞)) + λ∞
+    ///   λ(x) = (λ₀ - λ∞) exp(-s x / |λ₀ - λ∞|) + λ∞
     ///
     /// x is the largest entry of the error: [px] image-based, [rad] or [m] pose-based. ViSP's `vpAdaptiveGain` is the same function
     /// (of normalised coordinates: its slope is fx times this one).
@@ -30,9 +30,11 @@ impl Gain {
         let share = match *self {
             Gain::Constant(share) => share,
             Gain::Adaptive { near, far, .. } if near == far => far,
-            Gain::Adaptive { near, far, slope } => (near - far) * (-slope * error.abs() / (near - far)).exp() + far,
+            Gain::Adaptive { near, far, slope } => {
+                (near - far) * (-slope * error.abs() / (near - far).abs()).exp() + far
+            }
         };
-        share.clamp(0.0, 1.0)
+        if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Image-based visual servoing with a known rig.
 use super::interaction_matrix::InteractionMatrix;
-use super::pixel_reader::PixelReader;
+use super::known_arm::KnownArm;
 use super::{
     Arm, Configuration, Controller, Decision, Gain, Goal, Limit, Measurement, Step, Stepper, Takes, Task, TaskRows,
 };
@@ -15,20 +15,14 @@ use crate::rig::Rig;
 /// J stacks, for every feature and camera, the interaction matrix times the arm's Jacobian (Chaumette and Hutchinson 2006, part I, eq. 5;
 /// several cameras: part II), lens included, as the rig has them. Only joints between a camera and a feature move it, which
 /// makes cameras in the world and on the arm one case, and any mix of them. Because e is measured, a rig that is off costs steps and not
-/// accuracy. A [`Stepper`] makes the motion obey limits. Memory is asked for by the first step towards a goal, not by further ones.
+/// accuracy. A [`Stepper`] makes the motion obey limits. Where joints are as they are read, memory is asked for
+/// by the first step towards a goal, not by further ones.
 pub struct ImageBased {
     /// How it moves; may change between steps.
     pub settings: ImageSettings,
     /// What the robot takes.
     pub takes: Takes,
-    arm: Arm,
-    reader: PixelReader,
-    stepper: Stepper,
-    at: Configuration,
-    desired: Configuration,
-    goal: Vec<Sighting>,
-    /// Where the last command should have led [rad or m]; empty before the first.
-    expected: Vec<f64>,
+    known: KnownArm,
 }
 
 /// Settings of [`ImageBased`].
@@ -62,24 +56,12 @@ impl ImageBased {
     ///
     /// Errors: [`Error::Unusable`] with the paths of what is missing, or where there is no joint.
     pub fn new(rig: &Rig, settings: ImageSettings) -> Result<Self, Error> {
-        Ok(ImageBased {
-            stepper: Stepper::default(),
-            settings,
-            takes: Takes::default(),
-            arm: Arm::new(rig)?,
-            reader: PixelReader::new(rig)?,
-            at: Configuration::default(),
-            desired: Configuration::default(),
-            goal: Vec::new(),
-            expected: Vec::new(),
-        })
+        Ok(ImageBased { settings, takes: Takes::default(), known: KnownArm::new(rig, Stepper::default())? })
     }
 
     /// Sets where the features shall be seen; some cameras and features suffice. May change between steps.
     pub fn aim(&mut self, goal: &[Sighting]) {
-        self.goal.clear();
-        self.goal.extend_from_slice(goal);
-        self.desired.joints.clear();
+        self.known.aim(goal);
     }
 
     /// The motion of the next `dt` seconds, from what is seen now; features that are not seen, or not aimed at, are passed over.
@@ -98,31 +80,29 @@ impl ImageBased {
         limits: &[&dyn Limit],
         dt: f64,
     ) -> Result<&Step, Error> {
-        self.reader.configure(&self.arm, seen, joints, &mut self.at)?;
-        let errors = self.goal.iter().filter_map(|goal| error(seen, goal)).flatten();
+        let known = &mut self.known;
+        known.reader.configure(&known.arm, seen, joints, &mut known.at)?;
+        let errors = known.goal.iter().filter_map(|goal| error(seen, goal)).flatten();
         let Some(largest) = errors.map(f64::abs).reduce(f64::max) else {
-            let aimed = self.goal.len();
+            let aimed = known.goal.len();
             return Err(Error::NotEnoughData(format!("none of the {aimed} features aimed at is seen")));
         };
-        if self.settings.matrix.looks_ahead() && self.desired.joints.is_empty() {
-            let target = self.reader.joints_on_the_way(&self.goal, &self.at.joints)?;
-            self.arm.configure(&target, &mut self.desired);
-        }
-        let task = Pixels { settings: &self.settings, goal: &self.goal, seen, desired: &self.desired };
+        known.look_ahead(self.settings.matrix)?;
+        let task = Pixels { settings: &self.settings, goal: &known.goal, seen, desired: &known.desired };
         let goals = [Goal { share: self.settings.gain.share(largest), ..Goal::new(&task) }];
-        let step = self.stepper.step(&self.arm, &self.at, &goals, limits, dt);
-        self.at.move_at(&step.motion, dt);
+        let step = known.stepper.step(&known.arm, &known.at, &goals, limits, dt);
+        known.at.move_at(&step.motion, dt);
         Ok(step)
     }
 
     /// Joints of the last step [rad or m], as read or inferred; empty before the first.
     pub fn joints(&self) -> &[f64] {
-        &self.at.joints
+        &self.known.at.joints
     }
 
     /// Joints aimed at [rad or m]; empty before the first step that needed them.
     pub fn target(&self) -> &[f64] {
-        &self.desired.joints
+        &self.known.desired.joints
     }
 }
 
@@ -133,13 +113,14 @@ impl Controller for ImageBased {
 
     /// Where there are no readings, the joints are inferred, near where the last command should have led.
     fn decide(&mut self, now: &Measurement<'_>, limits: &[&dyn Limit], dt: f64) -> Result<Decision, Error> {
-        let unread = now.joints.is_empty();
-        let near = if unread { self.expected.clone() } else { now.joints.to_vec() };
-        let infer = unread || self.settings.infer_joints;
+        let near = self.known.near(now.joints);
+        let infer = now.joints.is_empty() || self.settings.infer_joints;
         let step = self.advance(now.seen, (&near, infer), limits, dt)?.clone();
-        self.expected.clear();
-        self.expected.extend(self.at.joints.iter().zip(&step.motion).map(|(joint, motion)| joint + motion));
-        Ok(Decision::new(self.takes, &self.arm, &self.at, &step, dt))
+        self.known.decide(self.takes, &step, dt)
+    }
+
+    fn held(&mut self) {
+        self.known.held();
     }
 }
 

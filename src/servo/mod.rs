@@ -11,6 +11,7 @@ mod gain;
 mod image_based;
 mod interaction_matrix;
 mod joint_bounds;
+mod known_arm;
 pub mod limits;
 mod model_based;
 mod model_based_tip;
@@ -26,7 +27,7 @@ mod takes;
 pub mod tasks;
 pub mod uncalibrated;
 
-pub use crate::simulate::world::Command;
+pub use crate::recording::Command;
 pub use approach::stretched;
 pub use arm::{Arm, Configuration, Sight};
 pub use controller::{Controller, Decision, Measurement};

@@ -1,8 +1,8 @@
 //! The paper's controller: infer the present and the target joints, command the difference, repeat.
-use super::pixel_reader::PixelReader;
+use super::known_arm::KnownArm;
 use super::tasks::{ImagePoints, JointTarget};
 use super::{
-    Active, Arm, Bound, Configuration, Constraint, Controller, Decision, Goal, Limit, Measurement, Step, Stepper, Takes,
+    Active, Bound, Configuration, Constraint, Controller, Decision, Goal, Limit, Measurement, Step, Stepper, Takes,
 };
 use crate::Error;
 use crate::infer::{Branch, Sighting};
@@ -15,14 +15,8 @@ use crate::rig::Rig;
 pub struct ModelBased {
     /// What the robot takes.
     pub takes: Takes,
-    arm: Arm,
-    reader: PixelReader,
-    stepper: Stepper,
-    at: Configuration,
+    known: KnownArm,
     target: JointTarget,
-    goal: Vec<Sighting>,
-    /// Where the last command should have led [rad or m]; empty before the first.
-    expected: Vec<f64>,
     /// What keeps the target from the pixels that are aimed at.
     held: Vec<Active>,
 }
@@ -35,24 +29,14 @@ impl ModelBased {
     ///
     /// Errors: [`Error::Unusable`] with the paths of what is missing, or where there is no joint.
     pub fn new(rig: &Rig) -> Result<Self, Error> {
-        let arm = Arm::new(rig)?;
-        Ok(ModelBased {
-            takes: Takes::default(),
-            target: JointTarget { joints: Vec::new(), sd: vec![1.0; arm.joints()] },
-            arm,
-            reader: PixelReader::new(rig)?,
-            stepper: Stepper::new(0.0),
-            at: Configuration::default(),
-            goal: Vec::new(),
-            expected: Vec::new(),
-            held: Vec::new(),
-        })
+        let known = KnownArm::new(rig, Stepper::new(0.0))?;
+        let target = JointTarget { joints: Vec::new(), sd: vec![1.0; known.arm.joints()] };
+        Ok(ModelBased { takes: Takes::default(), known, target, held: Vec::new() })
     }
 
     /// Sets where the features shall be seen; some cameras and features suffice. May change between steps.
     pub fn aim(&mut self, goal: &[Sighting]) {
-        self.goal.clear();
-        self.goal.extend_from_slice(goal);
+        self.known.aim(goal);
         self.target.joints.clear();
     }
 
@@ -62,22 +46,22 @@ impl ModelBased {
     /// Errors: [`Error::NotEnoughData`] where the pixels seen or aimed at lead to no joints; [`Error::Unusable`] where `near` is not of
     /// the rig.
     pub fn step(&mut self, seen: &[Sighting], near: &[f64], limits: &[&dyn Limit], dt: f64) -> Result<&Step, Error> {
-        let now = self.reader.joints_seen_or_near(seen, near)?;
+        let now = self.known.reader.joints_seen_or_near(seen, near)?;
         if self.target.joints.is_empty() {
-            let found = self.reader.joints_aimed_at(&self.goal, &now.joints)?;
+            let found = self.known.reader.joints_aimed_at(&self.known.goal, &now.joints)?;
             self.held = self.out_of_reach(&found);
             self.target.joints = found.joints;
         }
-        self.arm.configure(&now.joints, &mut self.at);
+        self.known.arm.configure(&now.joints, &mut self.known.at);
         let goals = [Goal::new(&self.target)];
-        let step = self.stepper.step(&self.arm, &self.at, &goals, limits, dt);
-        self.at.move_at(&step.motion, dt);
+        let step = self.known.stepper.step(&self.known.arm, &self.known.at, &goals, limits, dt);
+        self.known.at.move_at(&step.motion, dt);
         Ok(step)
     }
 
     /// Joints that were inferred last [rad or m]; empty before the first step.
     pub fn joints(&self) -> &[f64] {
-        &self.at.joints
+        &self.known.at.joints
     }
 
     /// Joints aimed at [rad or m]; empty before the first step towards them.
@@ -87,13 +71,13 @@ impl ModelBased {
 
     /// The ends of joints that keep a target from the pixels aimed at; none where it comes as near as pixels are told.
     fn out_of_reach(&mut self, target: &Branch) -> Vec<Active> {
-        if target.rms_px < REACHED * self.reader.sigma {
+        if target.rms_px < REACHED * self.known.reader.sigma {
             return Vec::new();
         }
         let mut at = Configuration::default();
-        self.arm.configure(&target.joints, &mut at);
-        let task = ImagePoints { targets: self.goal.clone(), seen: Vec::new(), sd: self.reader.sigma };
-        let mut active = self.stepper.step(&self.arm, &at, &[Goal::new(&task)], &[], 1.0).active.clone();
+        self.known.arm.configure(&target.joints, &mut at);
+        let task = ImagePoints { targets: self.known.goal.clone(), seen: Vec::new(), sd: self.known.reader.sigma };
+        let mut active = self.known.stepper.step(&self.known.arm, &at, &[Goal::new(&task)], &[], 1.0).active.clone();
         active.retain(|active| matches!(active.constraint, Constraint::Joint { bound: Bound::Position, .. }));
         active
     }
@@ -107,12 +91,14 @@ impl Controller for ModelBased {
     /// Where there are no readings, the joints are expected where the last command should have led; before the first, the most probable
     /// branch is taken.
     fn decide(&mut self, now: &Measurement<'_>, limits: &[&dyn Limit], dt: f64) -> Result<Decision, Error> {
-        let near = if now.joints.is_empty() { self.expected.clone() } else { now.joints.to_vec() };
+        let near = self.known.near(now.joints);
         let step = self.step(now.seen, &near, limits, dt)?.clone();
-        self.expected.clear();
-        self.expected.extend(self.at.joints.iter().zip(&step.motion).map(|(joint, motion)| joint + motion));
-        let mut decision = Decision::new(self.takes, &self.arm, &self.at, &step, dt);
+        let mut decision = self.known.decide(self.takes, &step, dt)?;
         decision.active.extend_from_slice(&self.held);
         Ok(decision)
+    }
+
+    fn held(&mut self) {
+        self.known.held();
     }
 }

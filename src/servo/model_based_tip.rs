@@ -3,8 +3,8 @@
 use super::{Controller, Decision, Limit, Measurement, Takes};
 use crate::Error;
 use crate::infer::{InferredPose, Sighting, TipInference};
+use crate::recording::Command;
 use crate::rig::Rig;
-use crate::simulate::world::Command;
 use handeye_solvers::Pose;
 use handeye_solvers::manifold::so3;
 
@@ -72,7 +72,7 @@ impl Controller for ModelBasedTip {
         let turn = so3::log(&(target.rotation * tip.rotation.transpose()));
         let shift = target.translation - tip.translation;
         // The same share of both, so that the tip moves straight.
-        let share = (self.speed[0] * dt / shift.norm()).min(self.speed[1] * dt / turn.norm()).min(1.0);
+        let share = (self.speed[0] * dt / shift.norm()).min(self.speed[1] * dt / turn.norm()).clamp(0.0, 1.0);
         let (turn, shift) = (turn * share, shift * share);
         let after = Pose { rotation: so3::exp(&turn) * tip.rotation, translation: tip.translation + shift };
         self.expected = Some(after);
@@ -82,6 +82,6 @@ impl Controller for ModelBasedTip {
         } else {
             Command::PoseDelta(after * tip.inverse())
         };
-        Ok(Decision { command, active: Vec::new() })
+        Ok(Decision { command, active: Vec::new(), conflict: Vec::new() })
     }
 }

@@ -34,7 +34,8 @@ pub struct Step {
     /// Where a limit gave way: constraints that cannot all hold, though without any one of them the others can. Other such sets may
     /// exist beside it.
     pub conflict: Vec<Constraint>,
-    /// True where numbers were not finite or the program broke down. The motion is 0, or leads back inside the limits.
+    /// True where numbers were not finite or the program broke down. The motion is 0, or leads back inside the limits; controllers hold the
+    /// robot then.
     pub failed: bool,
 }
 

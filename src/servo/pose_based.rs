@@ -1,6 +1,6 @@
 //! Position-based visual servoing with a known rig.
 use super::interaction_matrix::InteractionMatrix;
-use super::pixel_reader::PixelReader;
+use super::known_arm::KnownArm;
 use super::{
     Arm, Configuration, Controller, Decision, Gain, Goal, Limit, Measurement, Step, Stepper, Takes, Task, TaskRows,
 };
@@ -24,14 +24,7 @@ pub struct PoseBased {
     pub settings: PoseSettings,
     /// What the robot takes.
     pub takes: Takes,
-    arm: Arm,
-    reader: PixelReader,
-    stepper: Stepper,
-    at: Configuration,
-    desired: Configuration,
-    goal: Vec<Sighting>,
-    /// Where the last command should have led [rad or m]; empty before the first.
-    expected: Vec<f64>,
+    known: KnownArm,
     target: Option<Pose>,
 }
 
@@ -68,26 +61,14 @@ impl PoseBased {
     ///
     /// Errors: [`Error::Unusable`] with the paths of what is missing, or where there is no joint.
     pub fn new(rig: &Rig, settings: PoseSettings) -> Result<Self, Error> {
-        Ok(PoseBased {
-            stepper: Stepper::default(),
-            settings,
-            takes: Takes::default(),
-            arm: Arm::new(rig)?,
-            reader: PixelReader::new(rig)?,
-            at: Configuration::default(),
-            desired: Configuration::default(),
-            goal: Vec::new(),
-            expected: Vec::new(),
-            target: None,
-        })
+        let known = KnownArm::new(rig, Stepper::default())?;
+        Ok(PoseBased { settings, takes: Takes::default(), known, target: None })
     }
 
     /// Sets where the features shall be seen; some cameras and features suffice. May change between steps.
     pub fn aim(&mut self, goal: &[Sighting]) {
-        self.goal.clear();
-        self.goal.extend_from_slice(goal);
+        self.known.aim(goal);
         self.target = None;
-        self.desired.joints.clear();
     }
 
     /// The motion of the next `dt` seconds, from what is seen now. `joints`: their readings [rad or m]; may be empty where joints are
@@ -106,27 +87,25 @@ impl PoseBased {
         limits: &[&dyn Limit],
         dt: f64,
     ) -> Result<&Step, Error> {
-        self.reader.configure(&self.arm, seen, joints, &mut self.at)?;
+        let known = &mut self.known;
+        known.reader.configure(&known.arm, seen, joints, &mut known.at)?;
         let unknown = |what: &str| Error::NotEnoughData(format!("the pixels {what} leave the tip's pose open"));
-        let now = self.reader.tip(seen, &self.at.posture.tip()).ok_or_else(|| unknown("seen"))?;
+        let now = known.reader.tip(seen, &known.at.posture.tip()).ok_or_else(|| unknown("seen"))?;
         let target = match self.target {
             Some(target) => target,
-            None => *self.target.insert(self.reader.tip(&self.goal, &now).ok_or_else(|| unknown("aimed at"))?),
+            None => *self.target.insert(known.reader.tip(&known.goal, &now).ok_or_else(|| unknown("aimed at"))?),
         };
-        if self.settings.matrix.looks_ahead() && self.desired.joints.is_empty() {
-            let target = self.reader.joints_on_the_way(&self.goal, &self.at.joints)?;
-            self.arm.configure(&target, &mut self.desired);
-        }
+        known.look_ahead(self.settings.matrix)?;
         let task = Approach {
             settings: &self.settings,
             away: target.translation - now.translation,
             turn: so3::log(&(target.rotation * now.rotation.transpose())),
-            desired: &self.desired,
+            desired: &known.desired,
         };
         let largest = task.away.amax().max(task.turn.amax());
         let goals = [Goal { share: self.settings.gain.share(largest), ..Goal::new(&task) }];
-        let step = self.stepper.step(&self.arm, &self.at, &goals, limits, dt);
-        self.at.move_at(&step.motion, dt);
+        let step = known.stepper.step(&known.arm, &known.at, &goals, limits, dt);
+        known.at.move_at(&step.motion, dt);
         Ok(step)
     }
 
@@ -143,13 +122,14 @@ impl Controller for PoseBased {
 
     /// Where there are no readings, the joints are inferred, near where the last command should have led.
     fn decide(&mut self, now: &Measurement<'_>, limits: &[&dyn Limit], dt: f64) -> Result<Decision, Error> {
-        let unread = now.joints.is_empty();
-        let near = if unread { self.expected.clone() } else { now.joints.to_vec() };
-        let infer = unread || self.settings.infer_joints;
+        let near = self.known.near(now.joints);
+        let infer = now.joints.is_empty() || self.settings.infer_joints;
         let step = self.advance(now.seen, (&near, infer), limits, dt)?.clone();
-        self.expected.clear();
-        self.expected.extend(self.at.joints.iter().zip(&step.motion).map(|(joint, motion)| joint + motion));
-        Ok(Decision::new(self.takes, &self.arm, &self.at, &step, dt))
+        self.known.decide(self.takes, &step, dt)
+    }
+
+    fn held(&mut self) {
+        self.known.held();
     }
 }
 

@@ -1,9 +1,9 @@
 //! A closed loop around a controller: what to do with each measurement, and when and why to stop.
-use super::controller::{Controller, Measurement};
+use super::controller::{Controller, Decision, Measurement};
 use super::{Active, Bound, Constraint, Limit, Stop};
 use crate::Error;
 use crate::infer::Sighting;
-use crate::simulate::world::Command;
+use crate::recording::Command;
 use std::collections::VecDeque;
 
 /// When a loop moves, and when it stops. Everything may change between ticks.
@@ -17,7 +17,8 @@ pub struct LoopSettings {
     /// errors: else limits block the loop, or noise keeps it from doing better. As many as a motion to the goal takes at most; a loop of
     /// 1 kHz wants hundreds. Fewer than 4 never stop the loop.
     pub window: usize,
-    /// The loop has diverged where the error is this many times that of the beginning, in two measurements in a row.
+    /// The loop has diverged where the error is this many times that of the beginning, in two measurements in a row; of a target that is
+    /// followed, that of the beginning and all the way that the target has gone since.
     pub diverged: f64,
     /// After this the loop stops [s].
     pub timeout: f64,
@@ -58,6 +59,8 @@ pub struct Tick {
     pub error_px: Option<f64>,
     /// What holds the motion back.
     pub active: Vec<Active>,
+    /// Constraints that cannot all hold, where a limit gave way; see [`super::Step::conflict`].
+    pub conflict: Vec<Constraint>,
     /// Why the robot is held, while the loop goes on.
     pub waits: Option<String>,
     /// Why the loop has stopped. From then on every tick gives the same.
@@ -75,14 +78,16 @@ pub struct ServoLoop<C> {
     /// Time of the last measurement that was of use, and until when the last command moves the robot [s].
     useful: f64,
     moves_until: f64,
-    first_px: f64,
+    /// What the error may be without the loop having led away [px]: that of the beginning, and as far as a followed target has gone since.
+    baseline_px: Option<f64>,
+    /// Time of the last measurement that was judged [s].
+    judged: f64,
     /// The newest errors, and how many of them in a row are settled or beyond use.
     errors: VecDeque<f64>,
     n_settled: usize,
     n_diverged: usize,
-    /// Commands in a row that something held back, and what held back the last.
+    /// Commands in a row that something held back.
     n_held_back: usize,
-    held_back: Vec<Active>,
     stop: Option<Stop>,
 }
 
@@ -99,12 +104,12 @@ impl<C: Controller> ServoLoop<C> {
             began: None,
             useful: 0.0,
             moves_until: f64::NEG_INFINITY,
-            first_px: 0.0,
+            baseline_px: None,
+            judged: f64::NEG_INFINITY,
             errors: VecDeque::new(),
             n_settled: 0,
             n_diverged: 0,
             n_held_back: 0,
-            held_back: Vec::new(),
             stop: None,
         }
     }
@@ -115,12 +120,19 @@ impl<C: Controller> ServoLoop<C> {
         if self.goal == goal {
             return;
         }
+        let moved = self.error(goal).unwrap_or(0.0);
         self.goal = goal.to_vec();
         self.controller.aim(goal);
         self.errors.clear();
-        (self.n_settled, self.n_diverged, self.n_held_back) = (0, 0, 0);
-        if self.stop.take().is_some() {
+        (self.n_settled, self.n_held_back) = (0, 0);
+        let has_stopped = self.stop.take().is_some();
+        if has_stopped {
             self.began = None;
+        }
+        if self.settings.follow && !has_stopped {
+            self.baseline_px = self.baseline_px.map(|baseline| baseline + moved);
+        } else {
+            (self.baseline_px, self.n_diverged) = (None, 0);
         }
     }
 
@@ -162,7 +174,12 @@ impl<C: Controller> ServoLoop<C> {
         let Some(error) = error_px else {
             return Ok(self.wait(now, None, "none of the features of the goal is seen".to_owned()));
         };
-        self.judge(error);
+        // A measurement that is seen twice tells nothing the second time.
+        let is_new = measurement.time > self.judged;
+        if is_new {
+            self.judged = measurement.time;
+            self.judge(error);
+        }
         if self.stop.is_some() {
             return Ok(self.hold(error_px, None));
         }
@@ -176,9 +193,15 @@ impl<C: Controller> ServoLoop<C> {
         };
         self.useful = now;
         self.n_held_back = if decision.active.is_empty() { 0 } else { self.n_held_back + 1 };
-        self.held_back.clone_from(&decision.active);
+        if is_new {
+            self.stop = self.no_more(error, &decision);
+            if self.stop.is_some() {
+                return Ok(Tick { active: decision.active, conflict: decision.conflict, ..self.hold(error_px, None) });
+            }
+        }
         self.moves_until = now + dt;
-        Ok(Tick { command: decision.command, error_px, active: decision.active, waits: None, stop: None })
+        let Decision { command, active, conflict } = decision;
+        Ok(Tick { command, error_px, active, conflict, waits: None, stop: None })
     }
 
     /// Mean distance of the features that are seen from where they shall be [px].
@@ -194,37 +217,37 @@ impl<C: Controller> ServoLoop<C> {
         (count > 0).then(|| sum / f64::from(count))
     }
 
-    /// Whether the error says that the loop is to stop.
+    /// Whether the error alone says that the loop is to stop.
     fn judge(&mut self, error: f64) {
         let settings = &self.settings;
-        if self.errors.is_empty() {
-            self.first_px = error;
+        let baseline = *self.baseline_px.get_or_insert(error);
+        let in_a_row = |so_far: usize, again: bool| if again { so_far + 1 } else { 0 };
+        self.n_settled = in_a_row(self.n_settled, error <= settings.tolerance_px);
+        self.n_diverged = in_a_row(self.n_diverged, error > settings.diverged * baseline.max(settings.tolerance_px));
+        if self.n_diverged >= 2 {
+            self.stop = Some(Stop::Diverged { from_px: baseline, error_px: error });
+        } else if self.n_settled >= settings.settled.max(1) && !settings.follow {
+            self.stop = Some(Stop::Converged { error_px: error });
         }
+    }
+
+    /// Why the loop is to stop where the errors that commands led to fall no more.
+    fn no_more(&mut self, error: f64, decision: &Decision) -> Option<Stop> {
+        let settings = &self.settings;
         self.errors.push_back(error);
         while self.errors.len() > settings.window.max(1) {
             self.errors.pop_front();
         }
-        let in_a_row = |so_far: usize, again: bool| if again { so_far + 1 } else { 0 };
-        self.n_settled = in_a_row(self.n_settled, error <= settings.tolerance_px);
-        let limit = settings.diverged * self.first_px.max(settings.tolerance_px);
-        self.n_diverged = in_a_row(self.n_diverged, error > limit);
-        if self.n_diverged >= 2 {
-            self.stop = Some(Stop::Diverged { from_px: self.first_px, error_px: error });
-        } else if self.n_settled >= settings.settled.max(1) && !settings.follow {
-            self.stop = Some(Stop::Converged { error_px: error });
-        } else if settings.window >= 4
-            && self.errors.len() == settings.window
-            && !settings.follow
-            && let Some([error_px, sd_px]) = steady(&self.errors)
-        {
-            // Nothing else holds the arm where every motion of the window was held back.
-            let is_blocked = self.n_held_back + 1 >= settings.window;
-            self.stop = Some(if is_blocked {
-                Stop::Blocked { error_px: error, by: blocking(&self.held_back) }
-            } else {
-                Stop::NoBetter { error_px, sd_px }
-            });
+        if settings.window < 4 || self.errors.len() < settings.window || settings.follow {
+            return None;
         }
+        let [error_px, sd_px] = steady(&self.errors)?;
+        // Nothing else holds the arm where every motion of the window was held back.
+        if self.n_held_back < settings.window {
+            return Some(Stop::NoBetter { error_px, sd_px });
+        }
+        let (by, conflict) = (blocking(&decision.active), decision.conflict.clone());
+        Some(Stop::Blocked { error_px: error, by, conflict })
     }
 
     /// Holds the robot; where that has gone on for too long, for good.
@@ -237,8 +260,10 @@ impl<C: Controller> ServoLoop<C> {
         self.hold(error_px, Some(why))
     }
 
-    fn hold(&self, error_px: Option<f64>, waits: Option<String>) -> Tick {
-        Tick { command: Command::Hold, error_px, active: Vec::new(), waits, stop: self.stop.clone() }
+    fn hold(&mut self, error_px: Option<f64>, waits: Option<String>) -> Tick {
+        self.controller.held();
+        let (active, conflict) = (Vec::new(), Vec::new());
+        Tick { command: Command::Hold, error_px, active, conflict, waits, stop: self.stop.clone() }
     }
 }
 

@@ -23,6 +23,8 @@ pub enum Stop {
         error_px: f64,
         /// The limits.
         by: Vec<Active>,
+        /// Constraints that cannot all hold, where some of them gave way; see [`super::Step::conflict`].
+        conflict: Vec<Constraint>,
     },
     /// The error grew beyond any use.
     Diverged {
@@ -74,11 +76,17 @@ impl Stop {
                     "cannot do better than {error_px:.3} px, which varies by {sd_px:.3} px from one measurement to the next"
                 )
             }
-            Stop::Blocked { error_px, by } => {
-                let mut names: Vec<String> = by.iter().map(|active| active.words(rig, limits)).collect();
-                names.sort();
-                names.dedup();
-                format!("blocked at {error_px:.3} px by {}", names.join(", "))
+            Stop::Blocked { error_px, by, conflict } => {
+                let names = |constraints: &mut dyn Iterator<Item = &Constraint>| {
+                    let mut names: Vec<String> = constraints.map(|constraint| constraint.words(rig, limits)).collect();
+                    names.sort();
+                    names.dedup();
+                    names.join(", ")
+                };
+                let by = names(&mut by.iter().map(|active| &active.constraint));
+                let conflict = names(&mut conflict.iter());
+                let rest = if conflict.is_empty() { conflict } else { format!("; these cannot all hold: {conflict}") };
+                format!("blocked at {error_px:.3} px by {by}{rest}")
             }
             Stop::Diverged { from_px, error_px } => format!("diverged: from {from_px:.3} px to {error_px:.3} px"),
             Stop::Lost { why, seconds } => format!("lost for {seconds:.3} s: {why}"),
@@ -90,10 +98,10 @@ impl Stop {
     }
 }
 
-impl Active {
-    /// What holds the motion back, in words. `limits`: what the limits of the loop are called, in their order.
+impl Constraint {
+    /// Its name in words. `limits`: what the limits of the loop are called, in their order.
     pub fn words(&self, rig: &Rig, limits: &[String]) -> String {
-        match self.constraint {
+        match *self {
             Constraint::Joint { joint, bound, upper } => {
                 let end = if upper { "upper" } else { "lower" };
                 let what = match bound {

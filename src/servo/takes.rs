@@ -1,6 +1,6 @@
 //! From the motion of an arm to what its robot takes.
 use super::{Arm, Configuration};
-use crate::simulate::world::Command;
+use crate::recording::Command;
 use handeye_solvers::manifold::so3;
 
 /// What a robot takes.

@@ -81,12 +81,28 @@ fn image_based_and_pose_based_controllers_run_with_their_settings_and_without_jo
 #[test]
 fn every_limit_of_scenes_leaves_the_way_to_a_target_inside_of_it() {
     let folder = Folder::new("servo-limits");
-    let limits = "[limits]\nin_image = 2.0\npixel_speed = 400\ntip_speed = 1.0\ntip_box = { low = [-2, -2, -1], high = [2, 2, 2] }\n\
+    let limits = "[limits]\nin_image = 2.0\npixel_speed = 50\ntip_speed = 1.0\ntip_box = { low = [-2, -2, -1], high = [2, 2, 2] }\n\
                   follow_plane = { point = [0, 0, 0], normal = [0, 0, 1], tolerance = 2.0 }\n\
                   follow_line = { point = [0, 0, 0], direction = [0, 0, 1], tolerance = 3.0 }\n[loop]\nwindow = 30\n";
     folder.write("scene.toml", &format!("{SCENE}{limits}"));
-    let (text, _) = folder.expect(0, "servo ur5 scene.toml");
-    assert!(text.lines().last().unwrap().starts_with("converged"), "{text}");
+    let (json, _) = folder.expect(0, "servo ur5 scene.toml --json");
+    let json: Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["stop"], "converged");
+    let steps = json["steps"].as_array().unwrap();
+    let held = |name: &str| steps.iter().any(|step| step["active"].as_array().unwrap().iter().any(|what| what == name));
+    assert!(held("limit `pixel_speed`"), "{json}");
+    let model = Model::new(&catalog::rig("ur5").unwrap()).unwrap();
+    let tip = |step: &Value| {
+        let joints: Vec<f64> = step["joints"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
+        model.tip(&joints).translation
+    };
+    // Steps of a second at 1 m/s; a row is the tangent of the way.
+    let fastest = steps.windows(2).map(|pair| (tip(&pair[1]) - tip(&pair[0])).norm()).fold(0.0, f64::max);
+    assert!(fastest < 1.1, "{fastest} m in a second");
+    // Slower than the way needs, the tip is held back.
+    folder.write("scene.toml", &format!("{SCENE}[limits]\ntip_speed = 0.1\n"));
+    let (json, _) = folder.expect(0, "servo ur5 scene.toml --json");
+    assert!(json.contains("limit `tip_speed`"), "{json}");
     // Each of them blocks where the target is outside.
     for (name, limit) in [
         ("tip_box", "tip_box = { low = [-2, -2, -1], high = [-1.5, 2, 2] }"),
@@ -138,8 +154,14 @@ fn a_target_that_moves_is_followed_to_the_end_of_the_time() {
     let moving = SCENE.to_owned()
         + "velocity = [-0.02, 0.0, 0.0, 0.01, 0.0, 0.0]\nuntil = 20.0\n[loop]\nfollow = true\ntimeout = 40.0\n";
     folder.write("moving.toml", &moving);
-    let (text, _) = folder.expect(0, "servo ur5 moving.toml");
-    assert!(text.lines().last().unwrap().contains("timed out after 40.000 s at 0.000 px"), "{text}");
+    let (json, _) = folder.expect(0, "servo ur5 moving.toml --json");
+    let json: Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["stop"], "timed-out");
+    // While the target moves the arm is one step behind, of 4 px; once it stands, not at all.
+    let error = |step: &Value| step["error_px"].as_f64().unwrap();
+    let steps = json["steps"].as_array().unwrap();
+    assert!(steps[5..20].iter().all(|step| (0.5..15.0).contains(&error(step))), "{steps:?}");
+    assert!(steps[22..].iter().all(|step| error(step) < 1e-6), "{steps:?}");
 }
 
 #[test]
@@ -190,6 +212,19 @@ fn what_is_wrong_with_a_scene_is_said_with_its_place_and_what_would_do() {
         let (_, complaint) = folder.expect(2, "servo ur5 scene.toml");
         assert!(complaint.contains(message), "{text}\n{complaint}\n{message}");
     }
+    for (text, message) in [
+        ("[controller]\nkind = \"model-based-tip\"\nspeed = [0.1, -1]\n", "must be two numbers above 0: m/s and rad/s"),
+        ("[controller]\nkind = \"image-based\"\ngain = 2\n", "`gain`: must be at most 1, found 2"),
+    ] {
+        folder.write("scene.toml", &format!("{SCENE}{text}"));
+        let (_, complaint) = folder.expect(2, "servo ur5 scene.toml");
+        assert!(complaint.contains(message), "{text}\n{complaint}");
+    }
+    let idle =
+        SCENE.replace("[target]", "takes = \"pose-deltas\"\nexecution = { gain = [1, 1, 1, 1, 1, 1] }\n[target]");
+    folder.write("scene.toml", &idle);
+    let (_, complaint) = folder.expect(2, "servo ur5 scene.toml");
+    assert!(complaint.contains("`gain` of the scene's `execution` has no effect"), "{complaint}");
     folder.write("scene.toml", "[robot]\nstart = [1, 2]\n[target]\njoints = [1, 2]\n");
     let (_, complaint) = folder.expect(2, "servo ur5 scene.toml");
     assert!(complaint.contains("`start` of the scene has 2 numbers, the rig has 6 joints"), "{complaint}");

@@ -34,6 +34,7 @@ mod servo_limits;
 mod servo_loop;
 mod servo_memory;
 mod servo_singular;
+mod servo_stops;
 mod simulate;
 mod states;
 mod suggest;

@@ -272,5 +272,5 @@ fn every_limit_holds_in_every_step_of_random_loops_with_noise_and_starts_outside
         }
     }
     assert!(kept.iter().all(|[held, all]| 2 * held > *all), "limits held in {kept:?} steps");
-    assert!(100 * in_view >= 99 * loops, "features stayed in the images of {in_view} of {loops} loops");
+    assert_eq!((in_view, loops), (700, 700), "features stayed in the images of {in_view} of {loops} loops");
 }

@@ -12,7 +12,7 @@ use handeye::simulate::world::{Execution, Tracker, World, WorldOptions};
 use handeye::simulate::{SimulateOptions, simulate};
 
 /// A rig, and pairs of start and target joints with all features in view.
-fn rig_and_places(pairs: u64) -> (Rig, Vec<[Vec<f64>; 2]>) {
+pub fn rig_and_places(pairs: u64) -> (Rig, Vec<[Vec<f64>; 2]>) {
     let rig = catalog::rig("ur5").unwrap();
     let draw = |seed| {
         let options = SimulateOptions { samples: 2, seed, in_view: 1.0, ..SimulateOptions::default() };
@@ -23,12 +23,12 @@ fn rig_and_places(pairs: u64) -> (Rig, Vec<[Vec<f64>; 2]>) {
     (rig, places)
 }
 
-fn goal(world: &World, names: &Names, joints: &[f64]) -> Vec<Sighting> {
+pub fn goal(world: &World, names: &Names, joints: &[f64]) -> Vec<Sighting> {
     names.sightings(&Sample { pixels: world.exact(joints), ..Sample::default() })
 }
 
 /// Runs a loop to its stop; gives the stop and the number of commands that moved the robot.
-fn run<C: Controller>(
+pub fn run<C: Controller>(
     world: &mut World,
     rig: &Rig,
     servo: &mut ServoLoop<C>,
@@ -50,7 +50,7 @@ fn run<C: Controller>(
     }
 }
 
-fn settings() -> LoopSettings {
+pub fn settings() -> LoopSettings {
     LoopSettings { tolerance_px: 0.01, settled: 1, ..LoopSettings::default() }
 }
 
@@ -202,7 +202,11 @@ impl Controller for Restless {
     fn aim(&mut self, _goal: &[Sighting]) {}
 
     fn decide(&mut self, _: &Measurement<'_>, _: &[&dyn Limit], _: f64) -> Result<Decision, Error> {
-        Ok(Decision { command: Command::JointDelta(vec![0.05, 0.0, 0.0, 0.0, 0.0, 0.0]), active: Vec::new() })
+        Ok(Decision {
+            command: Command::JointDelta(vec![0.05, 0.0, 0.0, 0.0, 0.0, 0.0]),
+            active: Vec::new(),
+            conflict: Vec::new(),
+        })
     }
 }
 

@@ -135,7 +135,7 @@ fn two_views_at_about_a_right_angle_serve_best_and_one_point_of_view_is_refused_
     assert!((75..=105).contains(&best(0)), "condition numbers and errors {figures:?}");
     assert!((75..=120).contains(&best(1)), "condition numbers and errors {figures:?}");
     for first in 0..24 {
-        let (refused, joints) = of(f64::from(first), 0.0);
+        let (refused, joints) = of(f64::from(first) * TAU / 24.0, 0.0);
         assert!(
             matches!(&refused.stop, Some(Stop::Undetermined(why)) if why.contains("one point of view")),
             "{refused:?}"
@@ -170,9 +170,11 @@ impl Linear {
     }
 
     fn controller(&self, settings: Settings, limits: Limits) -> Uncalibrated {
-        let quantity = |name: &str| Quantity { name: name.to_owned(), limits, dead_band: self.dead_band };
-        let rows = vec![Row { sd: 0.1, camera: 0 }; 3];
-        Uncalibrated::new(vec![quantity("x"), quantity("y")], rows, settings).unwrap()
+        Uncalibrated::new(self.quantities(limits), vec![Row { sd: 0.1, camera: 0 }; 3], settings).unwrap()
+    }
+
+    fn quantities(&self, limits: Limits) -> Vec<Quantity> {
+        ["x", "y"].map(|name| Quantity { name: name.to_owned(), limits, dead_band: self.dead_band }).to_vec()
     }
 }
 
@@ -253,7 +255,9 @@ fn every_update_corrects_a_jacobian_that_is_wrong_in_spite_of_noise() {
         let mut servo = world.controller(settings, Limits::default());
         let wrong = dmatrix![400.0, 220.0; 20.0, 380.0; 110.0, -190.0];
         let doubt = DMatrix::from_diagonal_element(2, 2, 100.0 * 100.0);
-        servo.begin_with(Estimate::new(&[0.1; 3], &wrong, &[doubt.clone(), doubt.clone(), doubt], 0.7)).unwrap();
+        servo
+            .begin_with(Estimate::new(&[0.1; 3], &wrong, &[doubt.clone(), doubt.clone(), doubt], 0.7).unwrap())
+            .unwrap();
         let off = |servo: &Uncalibrated| {
             let estimate = servo.estimate().unwrap();
             let rows = [[500.0, 120.0], [-80.0, 300.0], [210.0, -90.0]].into_iter().enumerate();
@@ -269,4 +273,82 @@ fn every_update_corrects_a_jacobian_that_is_wrong_in_spite_of_noise() {
         }
         assert!(off(&servo) < 0.15 * before, "{update:?}: {before} -> {}", off(&servo));
     }
+}
+
+#[test]
+fn settings_that_mean_nothing_are_refused_by_name() {
+    let with = |change: &dyn Fn(&mut Settings)| {
+        let mut settings = Settings::default();
+        change(&mut settings);
+        let world = Linear::new(0.0);
+        Uncalibrated::new(world.quantities(Limits::default()), vec![Row { sd: 0.1, camera: 0 }; 3], settings)
+            .err()
+            .map(|error| error.to_string())
+    };
+    assert_eq!(with(&|_| ()), None);
+    type Change<'a> = &'a dyn Fn(&mut Settings);
+    let cases: [(Change<'_>, &str); 8] = [
+        (&|s| s.gain = 1.5, "`gain` is 1.5"),
+        (&|s| s.curvature = -1.0, "`curvature` is -1"),
+        (&|s| s.divergence = f64::NAN, "`divergence` is NaN"),
+        (&|s| s.worst_condition = f64::NAN, "`worst_condition` is NaN"),
+        (&|s| s.exploration.largest = 0.0, "`exploration.largest` is 0"),
+        (&|s| s.exploration.directions = vec![vec![1.0, 0.0]], "1 exploratory directions"),
+        (&|s| s.update = Update::LeastSquares { forgetting: 0.0, gate: 1.0 }, "`forgetting` is 0"),
+        (&|s| s.update = Update::Broyden { rate: 2.0, gate: 1.0 }, "`rate` is 2"),
+    ];
+    for (change, words) in cases {
+        assert!(with(change).is_some_and(|error| error.contains(words)), "{words}: {:?}", with(change));
+    }
+}
+
+/// From a Jacobian that is handed in, the first step is by the whole error that is seen, and rows that are seen later are taken as they are.
+#[test]
+fn what_is_handed_in_is_not_taught_by_errors_that_were_there_all_along() {
+    let mut world = Linear::new(0.0);
+    let mut servo = world.controller(Settings { gain: 1.0, trust: None, ..Settings::default() }, Limits::default());
+    let right = dmatrix![500.0, 120.0; -80.0, 300.0; 210.0, -90.0];
+    let doubt = DMatrix::from_diagonal_element(2, 2, 100.0);
+    let estimate = Estimate::new(&[0.1; 3], &right, &[doubt.clone(), doubt.clone(), doubt], 0.7).unwrap();
+    servo.begin_with(estimate).unwrap();
+    world.at = [0.1, -0.05];
+    for step in 0..3 {
+        let mut errors = world.errors();
+        if step == 0 {
+            errors[2] = f64::NAN;
+        }
+        let motion = servo.step(&world.at, &errors, &none(2), 1.0).unwrap().motion.to_vec();
+        world.at.iter_mut().zip(motion).for_each(|(at, motion)| *at += motion);
+        let left = world.errors().iter().map(|error| error.abs()).fold(0.0, f64::max);
+        assert!(left < 1.0, "step {step}: {left} px are left");
+    }
+    let off = (servo.estimate().unwrap().slopes(2)[0] - 210.0).abs();
+    assert!(off < 1.0, "a slope that was right is off by {off}");
+    let shapes = Estimate::new(&[0.1; 3], &right, &[], 0.7).err().unwrap().to_string();
+    assert!(shapes.contains("0 covariances"), "{shapes}");
+}
+
+#[test]
+fn nothing_seen_is_not_converged_and_cameras_at_the_goal_are_not_one() {
+    let mut world = Linear::new(0.0);
+    let mut servo = world.controller(Settings::plain(0.5, 0.01), Limits::default());
+    for _ in 0..30 {
+        let motion = servo.step(&world.at, &world.errors(), &none(2), 1.0).unwrap().motion.to_vec();
+        world.at.iter_mut().zip(motion).for_each(|(at, motion)| *at += motion);
+    }
+    let blind = servo.step(&world.at, &[f64::NAN; 3], &none(2), 1.0).unwrap();
+    assert!(matches!(blind.phase, Phase::Waiting(_)) && blind.motion == [0.0, 0.0], "{blind:?}");
+    // Two cameras of three rows that see no error yet are two cameras.
+    let rows: Vec<Row> = (0..6).map(|row| Row { sd: 0.1, camera: row / 3 }).collect();
+    let mut servo = Uncalibrated::new(world.quantities(Limits::default()), rows, Settings::default()).unwrap();
+    let there = servo.step(&[0.0, 0.0], &[0.01, -0.02, 0.03, 0.0, 0.02, -0.01], &none(2), 1.0).unwrap();
+    assert!(matches!(there.phase, Phase::Exploring), "{there:?}");
+    let mut servo = Uncalibrated::new(
+        world.quantities(Limits::default()),
+        (0..6).map(|row| Row { sd: 0.1, camera: usize::MAX - row / 3 }).collect(),
+        Settings::default(),
+    )
+    .unwrap();
+    let one = servo.step(&[0.0, 0.0], &[5.0, -2.0, 3.0, 5.0, -2.0, 3.0], &none(2), 1.0).unwrap();
+    assert!(matches!(one.phase, Phase::Stopped(Stop::Undetermined(_))), "{one:?}");
 }

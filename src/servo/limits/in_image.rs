@@ -23,6 +23,10 @@ impl Limit for InImage {
                 continue;
             };
             for (axis, &size) in size.iter().enumerate() {
+                // What no joint moves is out of a limit's hands.
+                if sight.slopes(axis).all(|slope| slope == 0.0) {
+                    continue;
+                }
                 // Pixel centres are at whole numbers.
                 let (low, high) = (self.margin - 0.5, f64::from(size) - 0.5 - self.margin);
                 let pixel = sight.error[axis];

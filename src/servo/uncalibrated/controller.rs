@@ -24,6 +24,8 @@ pub struct Uncalibrated {
     /// The last estimate whose condition was good, and how often it was needed.
     good: Option<Estimate>,
     losses: usize,
+    /// Rows of an estimate that was handed in whose errors were not measured yet.
+    unmeasured: Vec<usize>,
     /// Readings and errors of the step before; empty before the first, NaN where a row was not seen.
     readings: Vec<f64>,
     errors: Vec<f64>,
@@ -58,6 +60,7 @@ impl Uncalibrated {
             estimate: None,
             good: None,
             losses: 0,
+            unmeasured: Vec::new(),
             readings: Vec::new(),
             errors: Vec::new(),
             moved: vec![0.0; n],
@@ -79,10 +82,14 @@ impl Uncalibrated {
     /// Errors: [`Error::Unusable`] where it is not of these rows and quantities.
     pub fn begin_with(&mut self, estimate: Estimate) -> Result<(), Error> {
         let [m, n] = [self.rows.len(), self.quantities.len()];
-        if estimate.len() != m || estimate.slopes(0).len() != n {
+        if estimate.len() != m || estimate.n() != n {
             return Err(Error::Unusable(format!("an estimate of other rows than these {m} with {n} slopes each")));
         }
         (self.estimate, self.explorer, self.phase) = (Some(estimate), None, Phase::Servoing);
+        (self.good, self.losses) = (None, 0);
+        self.unmeasured = (0..m).collect();
+        self.readings.clear();
+        self.errors.clear();
         Ok(())
     }
 
@@ -166,8 +173,24 @@ impl Uncalibrated {
         if growth > self.settings.divergence {
             return Phase::Stopped(Stop::Diverged { growth });
         }
-        let lesson = Lesson { motion: &self.moved, before: &self.errors, now: errors, seen: &self.seen };
+        let unmeasured = &mut self.unmeasured;
+        let of_known: Vec<usize>;
+        let seen = if unmeasured.is_empty() {
+            &self.seen
+        } else {
+            of_known = self.seen.iter().copied().filter(|row| !unmeasured.contains(row)).collect();
+            &of_known
+        };
+        let lesson = Lesson { motion: &self.moved, before: &self.errors, now: errors, seen };
         learn(self.settings.update, self.settings.curvature, estimate, &lesson);
+        // The first error of a row is no surprise to its slopes.
+        unmeasured.retain(|&row| {
+            let is_seen = errors[row].is_finite();
+            if is_seen {
+                estimate.reset(row, errors[row]);
+            }
+            !is_seen
+        });
         self.servo(readings, errors, limits)
     }
 
@@ -219,15 +242,13 @@ impl Uncalibrated {
         let determined = self.aim.update(n, estimate, &self.seen, restraint);
         let condition = if determined { self.aim.condition } else { f64::INFINITY };
         let worst = self.settings.worst_condition;
-        if worst.is_finite() {
-            if condition > worst {
-                return self.lost(readings, errors, limits);
-            }
-            if condition < worst / GOOD && self.seen.len() == errors.len() {
-                match &mut self.good {
-                    Some(good) => good.clone_from(estimate),
-                    none => *none = Some(estimate.clone()),
-                }
+        if !determined || condition > worst {
+            return self.lost(readings, errors, limits);
+        }
+        if worst.is_finite() && condition < worst / GOOD && self.seen.len() == errors.len() {
+            match &mut self.good {
+                Some(good) => good.clone_from(estimate),
+                none => *none = Some(estimate.clone()),
             }
         }
         let mut share = self.settings.gain;

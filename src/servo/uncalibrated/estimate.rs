@@ -1,10 +1,11 @@
 //! What is known of the errors and of how they change with what is controlled: a Kalman filter per row.
+use crate::Error;
 use nalgebra::DMatrix;
 
 /// Errors, their slopes, and the covariance of both; rows are independent of each other.
 ///
 /// A row's state is (e, j). A motion d turns it into (e + j·d + w·d / 2, j + w), with w normal of variance (κ |d| s)² in every slope: s is
-/// the root mean square of the row's slopes and κ the curvature. A row of 6 slopes costs about 0.1 µs per motion and measurement.
+/// the root mean square of the row's slopes and κ the curvature.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
     n: usize,
@@ -30,9 +31,32 @@ const LEAST_SD: f64 = 1e-6;
 impl Estimate {
     /// From slopes by rows, and for each row the covariance of its slopes, n x n. `sds`: standard deviation of each row's noise [px];
     /// `curvature`: κ. Errors are 0 until they are measured.
-    pub fn new(sds: &[f64], slopes: &DMatrix<f64>, covariances: &[DMatrix<f64>], curvature: f64) -> Self {
+    ///
+    /// Errors: [`Error::Unusable`] where shapes do not fit, or numbers are not finite.
+    pub fn new(
+        sds: &[f64],
+        slopes: &DMatrix<f64>,
+        covariances: &[DMatrix<f64>],
+        curvature: f64,
+    ) -> Result<Self, Error> {
         let n = slopes.ncols();
         let (size, m) = (n + 1, sds.len());
+        let is_shaped = |covariance: &DMatrix<f64>| covariance.shape() == (n, n);
+        if n == 0 || slopes.nrows() != m || covariances.len() != m || !covariances.iter().all(is_shaped) {
+            let (rows, found) = (slopes.nrows(), covariances.len());
+            return Err(Error::Unusable(format!(
+                "{m} standard deviations, {rows} rows of {n} slopes and {found} covariances: as many of each are needed, covariances of \
+                 {n} by {n}"
+            )));
+        }
+        let mut numbers = sds
+            .iter()
+            .chain(slopes.iter())
+            .chain(covariances.iter().flat_map(|covariance| covariance.iter()))
+            .chain([&curvature]);
+        if numbers.any(|number| !number.is_finite()) {
+            return Err(Error::Unusable("an estimate needs finite numbers".to_owned()));
+        }
         let mut estimate = Estimate {
             n,
             states: vec![0.0; m * size],
@@ -54,7 +78,12 @@ impl Estimate {
                 }
             }
         }
-        estimate
+        Ok(estimate)
+    }
+
+    /// Number of quantities.
+    pub(super) fn n(&self) -> usize {
+        self.n
     }
 
     /// Number of rows.

@@ -42,8 +42,12 @@ impl Explorer {
     pub fn new(settings: &Exploration, quantities: &[Quantity], at: &[f64], errors: &[f64]) -> Self {
         let n = quantities.len();
         let one = |i: usize| {
-            let room = quantities[i].limits.lower.map_or(f64::INFINITY, |lower| at[i] - lower);
-            let way = if room < settings.size { 1.0 } else { -1.0 };
+            let limits = &quantities[i].limits;
+            let below = limits.lower.map_or(f64::INFINITY, |lower| at[i] - lower);
+            let above = limits.upper.map_or(f64::INFINITY, |upper| upper - at[i]);
+            // Where the motion may have to be enlarged, to the side with more room.
+            let reach = if settings.clarity > 0.0 { settings.largest } else { settings.size };
+            let way = if below < reach && above > below { 1.0 } else { -1.0 };
             (0..n).map(|k| if k == i { way } else { 0.0 }).collect()
         };
         let directions =
@@ -76,7 +80,7 @@ impl Explorer {
         }
         let motion: Vec<f64> = at.iter().zip(&self.start).map(|(now, start)| now - start).collect();
         let change: Vec<f64> = errors.iter().zip(&self.errors).map(|(now, start)| now - start).collect();
-        if change.iter().any(|change| change.is_nan()) {
+        if change.iter().any(|change| !change.is_finite()) {
             return Next::Failed("a tracker was lost while exploring".to_owned());
         }
         let clarity = clarity(&change, rows);
@@ -126,7 +130,10 @@ impl Explorer {
         };
         let covariances: Vec<DMatrix<f64>> = rows.iter().enumerate().map(covariance).collect();
         let sds: Vec<f64> = rows.iter().map(|row| row.sd).collect();
-        Next::Done(Box::new(Estimate::new(&sds, &slopes, &covariances, curvature)))
+        match Estimate::new(&sds, &slopes, &covariances, curvature) {
+            Ok(estimate) => Next::Done(Box::new(estimate)),
+            Err(_) => Next::Failed("the exploratory motions gave slopes that are not finite".to_owned()),
+        }
     }
 }
 

@@ -59,7 +59,7 @@ fn tells(estimate: &Estimate, lesson: &Lesson<'_>, gate: f64) -> bool {
         news += (difference - dot(estimate.slopes(row), lesson.motion)).powi(2) / variance;
         rows += 1.0;
     }
-    lesson.motion.iter().any(|motion| *motion != 0.0) && f64::min(change, news) >= gate * gate * rows
+    rows > 0.0 && lesson.motion.iter().any(|motion| *motion != 0.0) && f64::min(change, news) >= gate * gate * rows
 }
 
 fn filter(setting: f64, estimate: &mut Estimate, lesson: &Lesson<'_>) {

@@ -24,7 +24,7 @@ pub struct Row {
 /// What to do next.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Command<'a> {
-    /// Motion of every quantity in its own unit: finite, and inside its bounds.
+    /// Motion of every quantity in its own unit: finite, and inside its bounds or 0.
     pub motion: &'a [f64],
     /// Why.
     pub phase: &'a Phase,

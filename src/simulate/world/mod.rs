@@ -1,10 +1,8 @@
 //! Worlds for closed loops: a robot that carries out commands inexactly, cameras and trackers, things to grasp.
-mod command;
 mod object;
 mod robot;
 mod tracker;
 
-pub use command::Command;
 pub use object::Object;
 pub use robot::Execution;
 pub use tracker::Tracker;
@@ -12,7 +10,7 @@ pub use tracker::Tracker;
 use super::in_natural_order;
 use crate::Error;
 use crate::reach::{pixel_inside, sizes};
-use crate::recording::{Detection, RecordedCamera, Recording, Sample};
+use crate::recording::{Command, Detection, RecordedCamera, Recording, Sample};
 use crate::rig::{Model, ModelFeature, Parent, Rig};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
@@ -82,9 +80,7 @@ impl World {
     pub fn new(rig: &Rig, joints: &[f64], options: WorldOptions) -> Result<World, Error> {
         let model = Model::new(rig)?;
         let n = rig.robot.joints.len();
-        if joints.len() != n || joints.iter().any(|joint| !joint.is_finite()) {
-            return Err(Error::Unusable(format!("a world of {n} joints cannot begin at {joints:?}")));
-        }
+        check_joints(joints, n)?;
         options.execution.check(rig)?;
         let shares = [options.missed, options.readings.unwrap_or(0.0), options.latency];
         if !(0.0..=1.0).contains(&options.missed) || shares.iter().any(|number| !(0.0..f64::INFINITY).contains(number))
@@ -133,11 +129,9 @@ impl World {
 
     /// Puts the arm at these joints [rad or m], without a motion.
     ///
-    /// Errors: [`Error::Unusable`] where they are not as many as the robot's.
+    /// Errors: [`Error::Unusable`] where they are not as many as the robot's, or not finite.
     pub fn place(&mut self, joints: &[f64]) -> Result<(), Error> {
-        if joints.len() != self.joints.len() {
-            return Err(Error::Unusable(format!("the robot has {} joints, not {}", self.joints.len(), joints.len())));
-        }
+        check_joints(joints, self.joints.len())?;
         self.joints = joints.to_vec();
         self.past = VecDeque::from([(self.time, self.joints.clone(), self.objects.clone())]);
         Ok(())
@@ -245,6 +239,13 @@ impl World {
         let share = if t1 > t0 { ((time - t0) / (t1 - t0)).clamp(0.0, 1.0) } else { 1.0 };
         (j0.iter().zip(j1).map(|(from, to)| from + share * (to - from)).collect(), objects.clone())
     }
+}
+
+fn check_joints(joints: &[f64], n: usize) -> Result<(), Error> {
+    if joints.len() != n || joints.iter().any(|joint| !joint.is_finite()) {
+        return Err(Error::Unusable(format!("a robot of {n} joints cannot be at {joints:?}")));
+    }
+    Ok(())
 }
 
 /// Exact pixels of all features in view, in the order of recordings.

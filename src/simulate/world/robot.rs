@@ -1,7 +1,7 @@
 //! How a simulated robot carries out commands: inexactly, and inside the limits of its joints.
-use super::Command;
 use crate::Error;
 use crate::chain::{JointChain, Posture};
+use crate::recording::Command;
 use crate::rig::{Limits, PoseNoise, Rig};
 use crate::simulate::measure::moved;
 use handeye_solvers::Pose;
