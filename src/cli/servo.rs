@@ -15,19 +15,24 @@ use std::path::{Path, PathBuf};
 
 /// Servo in simulation, and report the pixel error against step
 ///
-/// The controller knows LEARNED; the world is the rig that the scene names, or LEARNED itself where it names none. The loop says why it
-/// stopped: converged, no better given the noise, blocked by limits, diverged, lost, timed out.
+/// The controller knows LEARNED; the world is the rig that the scene names, or LEARNED itself where it names none. Without LEARNED the
+/// controller is uncalibrated: it explores, and knows nothing but the joints' limits. The loop says why it stopped: converged, no better
+/// given the noise, blocked by limits, diverged, undetermined, lost, timed out.
 #[derive(Args)]
-#[command(after_help = "\
+#[command(
+    allow_missing_positional = true,
+    after_help = "\
 Examples:
   handeye servo learned.toml ur5-reach --plot reach.svg    a shipped scene
   handeye servo learned.toml scene.toml --json
-  handeye servo ur5 ur5-noisy --seed 7")]
+  handeye servo ur5-uncalibrated                           without any rig
+  handeye servo ur5 ur5-noisy --seed 7"
+)]
 pub struct Servo {
     /// The rig that the controller knows: a file in which every value is given, or the name of a shipped rig
     #[arg(value_name = "LEARNED")]
-    rig: PathBuf,
-    /// A scene file, or the name of a shipped scene (ur5-reach, ur5-visual, ur5-noisy)
+    rig: Option<PathBuf>,
+    /// A scene file, or the name of a shipped scene (ur5-reach, ur5-visual, ur5-noisy, ur5-uncalibrated)
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
     /// Seed of all noise, in place of the scene's
@@ -43,14 +48,16 @@ const ROWS: usize = 24;
 
 impl Servo {
     pub fn run(&self, is_json: bool) -> Result<Answer, Error> {
-        let input = read_rig(&self.rig)?;
+        let input = self.rig.as_deref().map(read_rig).transpose()?;
         let mut scene = read_scene(&self.scene)?;
         if let Some(plot) = &self.plot {
-            check_output(plot, &[self.rig.clone(), self.scene.clone()])?;
+            let inputs: Vec<PathBuf> = self.rig.iter().chain([&self.scene]).cloned().collect();
+            check_output(plot, &inputs)?;
         }
         scene.world.seed = self.seed.unwrap_or(scene.world.seed);
         let line = Line::new(is_json);
-        let run = scene::run(&input.rig, &scene, &mut |moment| {
+        let known = input.as_ref().map(|input| &input.rig);
+        let run = scene::run(known, &scene, &mut |moment| {
             line.show(&progress(moment));
             ControlFlow::Continue(())
         })?;
@@ -60,8 +67,10 @@ impl Servo {
             std::fs::write(path, scene::svg(&title, &run))
                 .map_err(|source| Error::Io { path: path.clone(), source })?;
         }
-        let words = run.stop.words(&input.rig, &run.limits);
-        let mut answer = Answer::new(text(&title, &run, &words), to_json(&run, &words, &input.rig));
+        let nothing = Rig::default();
+        let rig = known.or(scene.rig.as_ref()).unwrap_or(&nothing);
+        let words = run.stop.words(rig, &run.limits);
+        let mut answer = Answer::new(text(&title, &run, &words), to_json(&run, &words, rig));
         // Who follows a target goes on to the end of the time.
         let is_over = matches!(run.stop, Stop::TimedOut { error_px: Some(_), .. }) && scene.settings.follow;
         if !run.stop.is_success() && !is_over {

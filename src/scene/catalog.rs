@@ -5,4 +5,5 @@ pub const ALL: &[(&str, &str)] = &[
     ("ur5-reach", include_str!("../../models/scenes/ur5-reach.toml")),
     ("ur5-visual", include_str!("../../models/scenes/ur5-visual.toml")),
     ("ur5-noisy", include_str!("../../models/scenes/ur5-noisy.toml")),
+    ("ur5-uncalibrated", include_str!("../../models/scenes/ur5-uncalibrated.toml")),
 ];

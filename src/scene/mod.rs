@@ -3,11 +3,13 @@ mod catalog;
 mod plot;
 mod read;
 mod read_control;
+mod read_faults;
 mod read_limits;
 mod run;
 
 pub use catalog::ALL;
 pub use plot::svg;
+pub use read_faults::NamedFault;
 pub use run::{Moment, Run, run};
 
 use crate::rig::Rig;
@@ -25,14 +27,16 @@ pub struct Scene {
     pub rig: Option<Rig>,
     /// How the world differs from it.
     pub world: WorldOptions,
+    /// Trackers that fail.
+    pub faults: Vec<NamedFault>,
     /// What the robot takes.
     pub takes: Takes,
     /// Joints at the beginning [rad or m].
     pub start: Vec<f64>,
     /// Where the features shall be seen: where they are with these joints, which may move.
     pub target: Target,
-    /// What turns measurements into commands.
-    pub control: Control,
+    /// What turns measurements into commands; `None` is [`Control::ModelBased`] with a rig, and [`Control::Uncalibrated`] without.
+    pub control: Option<Control>,
     /// Limits beside those of the joints, by name.
     pub limits: Vec<(String, LimitKind)>,
     /// When the loop stops.
@@ -75,6 +79,40 @@ pub enum Control {
     ImageBased(ImageSettings),
     /// [`crate::servo::PoseBased`].
     PoseBased(PoseSettings),
+    /// [`crate::servo::UncalibratedJoints`].
+    Uncalibrated(UncalibratedControl),
+}
+
+impl Control {
+    /// The word for it in scene files.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Control::ModelBased => "model-based",
+            Control::ModelBasedTip { .. } => "model-based-tip",
+            Control::ImageBased(_) => "image-based",
+            Control::PoseBased(_) => "pose-based",
+            Control::Uncalibrated(UncalibratedControl { hybrid: true, .. }) => "hybrid",
+            Control::Uncalibrated(_) => "uncalibrated",
+        }
+    }
+}
+
+/// How [`crate::servo::UncalibratedJoints`] servoes in a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UncalibratedControl {
+    /// Standard deviation that trackers are taken to have [px].
+    pub pixels: f64,
+    /// Share of the errors that a command takes away, in (0, 1]; `None` is the default of its settings.
+    pub gain: Option<f64>,
+    /// True where the rig that is known is followed as far as it is right, false where it is not even looked at.
+    pub hybrid: bool,
+}
+
+impl Default for UncalibratedControl {
+    /// 0.3 px, without any rig.
+    fn default() -> Self {
+        UncalibratedControl { pixels: 0.3, gain: None, hybrid: false }
+    }
 }
 
 /// A limit of a scene.

@@ -1,7 +1,8 @@
 //! Reading scene files, with a place for every mistake.
 use super::read_control::read_control;
+use super::read_faults::read_faults;
 use super::read_limits::read_limits;
-use super::{Control, Scene, Target};
+use super::{Scene, Target};
 use crate::Error;
 use crate::rig::read::document::{Fields, Node, Source, parse};
 use crate::rig::read::noise::read_pose_noise;
@@ -43,9 +44,12 @@ impl Scene {
             .ok_or_else(|| root.error("has no table `robot`, which says where the arm starts"))?;
         let target = section("target", &["joints", "velocity", "until"])?
             .ok_or_else(|| root.error("has no table `target`, which says where the features shall be seen"))?;
-        let (tracker, missed) = match section("tracker", &["kind", "sd", "missed"])? {
-            Some(fields) => read_tracker(&fields)?,
-            None => (Tracker::Exact, 0.0),
+        let (tracker, missed, faults) = match section("tracker", &["kind", "sd", "missed", "faults"])? {
+            Some(fields) => {
+                let (tracker, missed) = read_tracker(&fields)?;
+                (tracker, missed, read_faults(&fields)?)
+            }
+            None => (Tracker::Exact, 0.0, Vec::new()),
         };
         let takes =
             robot.optional("takes", |node| node.word("kind of command", Takes::ALL, Takes::name))?.unwrap_or_default();
@@ -56,10 +60,12 @@ impl Scene {
                 execution: robot.optional("execution", read_execution)?.unwrap_or_default(),
                 readings: robot.optional("readings", read_readings)?.unwrap_or(default.readings),
                 tracker,
+                faults: Vec::new(),
                 missed,
                 latency: robot.optional("latency", Node::not_negative)?.unwrap_or(default.latency),
                 seed: root.optional("seed", Node::whole)?.unwrap_or(default.seed),
             },
+            faults,
             takes,
             start: joints(&robot, "start", rig.as_ref())?,
             target: Target {
@@ -68,8 +74,8 @@ impl Scene {
                 until: target.optional("until", Node::not_negative)?.unwrap_or(f64::INFINITY),
             },
             control: match root.field("controller") {
-                Some(field) => read_control(field.value)?,
-                None => Control::ModelBased,
+                Some(field) => Some(read_control(field.value)?),
+                None => None,
             },
             limits: match root.field("limits") {
                 Some(field) => read_limits(field.value)?,
@@ -127,12 +133,13 @@ fn read_readings(node: &Node) -> Result<Option<f64>, Error> {
 }
 
 fn read_execution(node: &Node) -> Result<Execution, Error> {
-    let fields = node.clone().table(&["joints", "pose", "share", "gain"])?;
+    let fields = node.clone().table(&["joints", "pose", "share", "dead_band", "gain"])?;
     let default = Execution::default();
     Ok(Execution {
         joints: fields.optional("joints", Node::not_negative)?.unwrap_or(default.joints),
         pose: fields.optional("pose", read_pose_noise)?.unwrap_or(default.pose),
         share: fields.optional("share", Node::not_negative)?.unwrap_or(default.share),
+        dead_band: fields.optional("dead_band", Node::not_negative)?.unwrap_or(default.dead_band),
         gain: fields.optional("gain", Node::any_numbers)?.unwrap_or(default.gain),
     })
 }

@@ -1,19 +1,27 @@
 //! Reading which controller a scene has.
-use super::Control;
+use super::{Control, UncalibratedControl};
 use crate::Error;
-use crate::rig::read::document::Node;
+use crate::rig::read::document::{Fields, Node};
 use crate::servo::{Gain, ImageSettings, InteractionMatrix, PoseSettings};
 
 /// The words for controllers.
-const KINDS: &[&str] = &["model-based", "model-based-tip", "image-based", "pose-based"];
+const KINDS: &[&str] = &["model-based", "model-based-tip", "image-based", "pose-based", "uncalibrated", "hybrid"];
 
 /// The table `controller` of a scene.
 pub(super) fn read_control(node: Node) -> Result<Control, Error> {
-    let fields = node.table(&["kind", "speed", "matrix", "gain", "infer_joints"])?.labelled("controller");
+    let fields = node.table(&["kind", "speed", "matrix", "gain", "infer_joints", "pixels"])?.labelled("controller");
     let kind = fields.optional("kind", |node| node.word("controller", KINDS, |name| name))?.unwrap_or(KINDS[0]);
     let is_visual = kind == "image-based" || kind == "pose-based";
     if kind != "model-based-tip" && fields.field("speed").is_some() {
         return Err(fields.error("`speed` ([m/s, rad/s]) is for model-based-tip; others take [limits]"));
+    }
+    if kind == "uncalibrated" || kind == "hybrid" {
+        return read_uncalibrated(&fields, kind == "hybrid").map(Control::Uncalibrated);
+    }
+    if fields.field("pixels").is_some() {
+        return Err(
+            fields.error(format!("`pixels` (noise of the trackers) is for uncalibrated and hybrid, this is {kind}"))
+        );
     }
     if let Some(key) = ["matrix", "gain", "infer_joints"].iter().find(|key| !is_visual && fields.field(key).is_some()) {
         return Err(fields.error(format!("`{key}` is for image-based and pose-based, this is {kind}")));
@@ -34,6 +42,18 @@ pub(super) fn read_control(node: Node) -> Result<Control, Error> {
             Control::ModelBasedTip { speed: speed.unwrap_or([f64::INFINITY; 2]) }
         }
         _ => Control::ModelBased,
+    })
+}
+
+fn read_uncalibrated(fields: &Fields<'_>, hybrid: bool) -> Result<UncalibratedControl, Error> {
+    if let Some(key) = ["matrix", "infer_joints"].iter().find(|key| fields.field(key).is_some()) {
+        return Err(fields.error(format!("`{key}` is for image-based and pose-based")));
+    }
+    let default = UncalibratedControl::default();
+    Ok(UncalibratedControl {
+        pixels: fields.optional("pixels", Node::positive)?.unwrap_or(default.pixels),
+        gain: fields.optional("gain", read_share)?,
+        hybrid,
     })
 }
 

@@ -1,13 +1,14 @@
 //! Running a scene.
-use super::{Control, LimitKind, Scene};
+use super::{Control, LimitKind, Scene, UncalibratedControl};
 use crate::Error;
 use crate::infer::{Names, Sighting};
 use crate::recording::{Detection, Recording, Sample};
 use crate::rig::Rig;
 use crate::servo::limits::{HalfSpace, InImage, PixelSpeed, TipBox, TipSpeed, VirtualFixture};
+use crate::servo::uncalibrated::Settings;
 use crate::servo::{
     Active, Command, Constraint, Controller, ImageBased, Limit, Measurement, ModelBased, ModelBasedTip, PoseBased,
-    ServoLoop, Stop, Takes,
+    ServoLoop, Stop, Takes, UncalibratedJoints,
 };
 use crate::simulate::world::World;
 use handeye_solvers::Pose;
@@ -53,19 +54,58 @@ pub struct Moment {
     pub waits: Option<String>,
 }
 
-/// Runs a scene with a controller that knows `known`; what `watch` says of every moment may break it off.
+/// Runs a scene with a controller that knows `known`; what `watch` says of every moment may break it off. Without a rig that is known, the
+/// controller is uncalibrated, and only names and joint limits of the scene's own rig are told.
 ///
-/// Errors: [`Error::Unusable`] where rig and scene do not fit; [`Error::Cancelled`]; those of the controller.
-pub fn run(known: &Rig, scene: &Scene, watch: &mut dyn FnMut(&Moment) -> ControlFlow<()>) -> Result<Run, Error> {
-    match &scene.control {
-        Control::ModelBased => {
+/// Errors: [`Error::Unusable`] where rig and scene do not fit, or the scene's controller needs a rig and none is known;
+/// [`Error::Cancelled`]; those of the controller.
+pub fn run(
+    known: Option<&Rig>,
+    scene: &Scene,
+    watch: &mut dyn FnMut(&Moment) -> ControlFlow<()>,
+) -> Result<Run, Error> {
+    let default = match known {
+        Some(_) => Control::ModelBased,
+        None => Control::Uncalibrated(UncalibratedControl::default()),
+    };
+    let control = scene.control.clone().unwrap_or(default);
+    let (learned, known) = match (known, &scene.rig) {
+        (Some(known), _) => (Some(known), known),
+        (None, Some(truth)) => (None, truth),
+        (None, None) => {
+            return Err(Error::Unusable("the scene names no `rig`, so there is no world: give one".to_owned()));
+        }
+    };
+    if let Control::Uncalibrated(uncalibrated) = control {
+        let moves_tip = matches!(scene.takes, Takes::PoseDelta | Takes::PoseVelocity);
+        if moves_tip {
+            return Err(Error::Unusable(format!(
+                "an uncalibrated controller moves joints, this robot takes {}",
+                scene.takes.name()
+            )));
+        }
+        let settings = if uncalibrated.hybrid { Settings::with_rig() } else { Settings::default() };
+        let settings = Settings { gain: uncalibrated.gain.unwrap_or(settings.gain), ..settings };
+        let mut controller = match learned.filter(|_| uncalibrated.hybrid) {
+            Some(learned) => UncalibratedJoints::with_rig(learned, uncalibrated.pixels, settings)?,
+            None if uncalibrated.hybrid => return Err(needs_rig("hybrid")),
+            None => UncalibratedJoints::new(&known.robot.joints, uncalibrated.pixels, settings)?,
+        };
+        controller.takes = scene.takes;
+        return run_with(controller, known, scene, watch);
+    }
+    let Some(known) = learned else {
+        return Err(needs_rig(control.name()));
+    };
+    match control {
+        Control::ModelBased | Control::Uncalibrated(_) => {
             let mut controller = ModelBased::new(known)?;
             controller.takes = scene.takes;
             run_with(controller, known, scene, watch)
         }
         Control::ModelBasedTip { speed } => {
             let mut controller = ModelBasedTip::new(known)?;
-            (controller.takes, controller.speed) = (scene.takes, *speed);
+            (controller.takes, controller.speed) = (scene.takes, speed);
             if !matches!(scene.takes, Takes::PoseDelta | Takes::PoseVelocity) {
                 return Err(Error::Unusable(format!(
                     "a controller that moves the tip needs a robot that takes pose-deltas or pose-velocities, this takes {}",
@@ -75,16 +115,22 @@ pub fn run(known: &Rig, scene: &Scene, watch: &mut dyn FnMut(&Moment) -> Control
             run_with(controller, known, scene, watch)
         }
         Control::ImageBased(settings) => {
-            let mut controller = ImageBased::new(known, settings.clone())?;
+            let mut controller = ImageBased::new(known, settings)?;
             controller.takes = scene.takes;
             run_with(controller, known, scene, watch)
         }
         Control::PoseBased(settings) => {
-            let mut controller = PoseBased::new(known, settings.clone())?;
+            let mut controller = PoseBased::new(known, settings)?;
             controller.takes = scene.takes;
             run_with(controller, known, scene, watch)
         }
     }
+}
+
+fn needs_rig(controller: &str) -> Error {
+    Error::Unusable(format!(
+        "a controller of kind {controller} needs a rig that it knows, and none is given: give LEARNED, or `kind = \"uncalibrated\"`"
+    ))
 }
 
 fn run_with<C: Controller>(
@@ -95,7 +141,11 @@ fn run_with<C: Controller>(
 ) -> Result<Run, Error> {
     let truth = scene.rig.as_ref().unwrap_or(known);
     check(truth, known, scene)?;
-    let mut world = World::new(truth, &scene.start, scene.world.clone())?;
+    let mut options = scene.world.clone();
+    for fault in &scene.faults {
+        options.faults.push(fault.of(truth)?);
+    }
+    let mut world = World::new(truth, &scene.start, options)?;
     let names = Names::new(known, world.header());
     let (limit_names, limits): (Vec<String>, Vec<Box<dyn Limit>>) = scene.limits(known).into_iter().unzip();
     let limits: Vec<&dyn Limit> = limits.iter().map(|limit| &**limit as &dyn Limit).collect();
@@ -164,6 +214,7 @@ fn check(truth: &Rig, known: &Rig, scene: &Scene) -> Result<(), Error> {
     let without_effect = [
         ("pose", execution.pose.is_noisy() && !moves_tip),
         ("joints", execution.joints > 0.0 && moves_tip),
+        ("dead_band", execution.dead_band > 0.0 && moves_tip),
         ("gain", !execution.gain.is_empty() && moves_tip),
     ];
     if let Some((key, _)) = without_effect.iter().find(|(_, is_idle)| *is_idle) {

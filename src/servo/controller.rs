@@ -1,5 +1,5 @@
 //! What a closed loop asks of a controller.
-use super::{Active, Arm, Configuration, Constraint, Limit, Step, Takes};
+use super::{Active, Arm, Configuration, Constraint, Limit, Step, Stop, Takes};
 use crate::Error;
 use crate::infer::Sighting;
 use crate::recording::Command;
@@ -24,9 +24,21 @@ pub struct Decision {
     pub active: Vec<Active>,
     /// Constraints that cannot all hold, where a limit gave way; see [`Step::conflict`].
     pub conflict: Vec<Constraint>,
+    /// Features whose trackers are not believed, as camera and feature: their errors are not those of the loop.
+    pub left_out: Vec<(usize, usize)>,
+    /// True where the motion is to learn from and not to arrive: errors need not fall.
+    pub explores: bool,
+    /// Why the controller gives up, where it does.
+    pub stop: Option<Stop>,
 }
 
 impl Decision {
+    /// A command that nothing holds back.
+    pub fn free(command: Command) -> Self {
+        let (active, conflict, left_out) = (Vec::new(), Vec::new(), Vec::new());
+        Decision { command, active, conflict, left_out, explores: false, stop: None }
+    }
+
     /// A joint motion, as what the robot takes.
     ///
     /// Errors: [`Error::NotEnoughData`] for a step that failed, whose motion is worth nothing.
@@ -37,7 +49,7 @@ impl Decision {
             ));
         }
         let command = takes.command(arm, at, &step.motion, dt);
-        Ok(Decision { command, active: step.active.clone(), conflict: step.conflict.clone() })
+        Ok(Decision { active: step.active.clone(), conflict: step.conflict.clone(), ..Decision::free(command) })
     }
 }
 

@@ -82,6 +82,6 @@ impl Controller for ModelBasedTip {
         } else {
             Command::PoseDelta(after * tip.inverse())
         };
-        Ok(Decision { command, active: Vec::new(), conflict: Vec::new() })
+        Ok(Decision::free(command))
     }
 }

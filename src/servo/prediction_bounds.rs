@@ -1,6 +1,7 @@
 //! How far a learned rig may be off in what it predicts: for the margins of limits.
 use super::{Arm, Configuration};
 use crate::Error;
+use crate::infer::Sighting;
 use crate::rig::{CameraField, JointField, Parameter, Rig};
 use handeye_solvers::Pose;
 use handeye_solvers::manifold::so3;
@@ -15,6 +16,7 @@ use nalgebra::Vector3;
 /// What only a prior determines (a world frame that nothing fixes) counts with all of the prior. It is for where a margin must not be too
 /// small: k sd suits [`super::limits::InImage`] in pixels, and [`super::limits::HalfSpace`], [`super::limits::TipBox`] and
 /// [`super::limits::LinkDistance`] in metres.
+#[derive(Clone)]
 pub struct PredictionBounds {
     arm: Arm,
     /// Both ways by one standard deviation, for every number.
@@ -62,6 +64,19 @@ impl PredictionBounds {
             (0..2).for_each(|k| sums[k] += 0.5 * (up[k] - down[k]).abs());
         }
         Some(sums[0].max(sums[1]))
+    }
+
+    /// By how much each learned number, off by its standard deviation, changes the slopes of pixels by the joints, two rows per sighting.
+    pub(super) fn slopes(&self, joints: &[f64], sightings: &[Sighting]) -> Vec<Vec<f64>> {
+        let mut at = Configuration::default();
+        let mut slopes = |arm: &Arm| {
+            arm.configure(joints, &mut at);
+            let sights = sightings.iter().filter_map(|sighting| arm.sight(&at, sighting));
+            sights.flat_map(|sight| sight.slopes(0).chain(sight.slopes(1)).collect::<Vec<f64>>()).collect::<Vec<f64>>()
+        };
+        let change =
+            |[up, down]: &[Arm; 2]| slopes(up).iter().zip(slopes(down)).map(|(up, down)| 0.5 * (up - down)).collect();
+        self.moved.iter().map(change).collect()
     }
 
     /// Of the tip's position [m], along whichever direction. `joints`: one reading per joint [rad or m].

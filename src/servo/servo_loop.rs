@@ -74,6 +74,8 @@ pub struct ServoLoop<C> {
     /// May change between ticks.
     pub settings: LoopSettings,
     goal: Vec<Sighting>,
+    /// What the controller does not believe.
+    left_out: Vec<(usize, usize)>,
     began: Option<f64>,
     /// Time of the last measurement that was of use, and until when the last command moves the robot [s].
     useful: f64,
@@ -101,6 +103,7 @@ impl<C: Controller> ServoLoop<C> {
             controller,
             settings,
             goal: Vec::new(),
+            left_out: Vec::new(),
             began: None,
             useful: 0.0,
             moves_until: f64::NEG_INFINITY,
@@ -193,21 +196,26 @@ impl<C: Controller> ServoLoop<C> {
         };
         self.useful = now;
         self.n_held_back = if decision.active.is_empty() { 0 } else { self.n_held_back + 1 };
-        if is_new {
-            self.stop = self.no_more(error, &decision);
+        if decision.explores || decision.left_out != self.left_out {
+            self.errors.clear();
+        }
+        self.left_out.clone_from(&decision.left_out);
+        if is_new || decision.stop.is_some() {
+            self.stop = decision.stop.clone().or_else(|| self.no_more(error, &decision));
             if self.stop.is_some() {
                 return Ok(Tick { active: decision.active, conflict: decision.conflict, ..self.hold(error_px, None) });
             }
         }
         self.moves_until = now + dt;
-        let Decision { command, active, conflict } = decision;
+        let Decision { command, active, conflict, .. } = decision;
         Ok(Tick { command, error_px, active, conflict, waits: None, stop: None })
     }
 
     /// Mean distance of the features that are seen from where they shall be [px].
     fn error(&self, seen: &[Sighting]) -> Option<f64> {
         let (mut sum, mut count) = (0.0, 0);
-        for target in &self.goal {
+        let believed = |target: &&Sighting| !self.left_out.contains(&(target.camera, target.feature));
+        for target in self.goal.iter().filter(believed) {
             let same = |seen: &&Sighting| (seen.camera, seen.feature) == (target.camera, target.feature);
             if let Some(seen) = seen.iter().find(same) {
                 sum += (seen.pixel[0] - target.pixel[0]).hypot(seen.pixel[1] - target.pixel[1]);
@@ -238,7 +246,7 @@ impl<C: Controller> ServoLoop<C> {
         while self.errors.len() > settings.window.max(1) {
             self.errors.pop_front();
         }
-        if settings.window < 4 || self.errors.len() < settings.window || settings.follow {
+        if decision.explores || settings.window < 4 || self.errors.len() < settings.window || settings.follow {
             return None;
         }
         let [error_px, sd_px] = steady(&self.errors)?;

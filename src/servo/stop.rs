@@ -33,6 +33,11 @@ pub enum Stop {
         /// Mean pixel distance now [px].
         error_px: f64,
     },
+    /// What is seen does not determine how to move.
+    Undetermined {
+        /// Why not, and what would help.
+        why: String,
+    },
     /// Nothing could be made of what was seen for too long.
     Lost {
         /// Why the last measurement was of no use.
@@ -57,6 +62,7 @@ impl Stop {
             Stop::NoBetter { .. } => "no-better",
             Stop::Blocked { .. } => "blocked",
             Stop::Diverged { .. } => "diverged",
+            Stop::Undetermined { .. } => "undetermined",
             Stop::Lost { .. } => "lost",
             Stop::TimedOut { .. } => "timed-out",
         }
@@ -89,6 +95,7 @@ impl Stop {
                 format!("blocked at {error_px:.3} px by {by}{rest}")
             }
             Stop::Diverged { from_px, error_px } => format!("diverged: from {from_px:.3} px to {error_px:.3} px"),
+            Stop::Undetermined { why } => format!("undetermined: {why}"),
             Stop::Lost { why, seconds } => format!("lost for {seconds:.3} s: {why}"),
             Stop::TimedOut { error_px: Some(error_px), seconds } => {
                 format!("timed out after {seconds:.3} s at {error_px:.3} px")

@@ -234,8 +234,69 @@ fn what_is_wrong_with_a_scene_is_said_with_its_place_and_what_would_do() {
     let (_, complaint) = folder.expect(2, "servo ur5 nowhere");
     assert!(
         complaint
-            .contains("nowhere: neither a scene file nor a shipped scene (known: ur5-reach, ur5-visual, ur5-noisy)"),
+            .contains("nowhere: neither a scene file nor a shipped scene (known: ur5-reach, ur5-visual, ur5-noisy, ur5-uncalibrated)"),
         "{complaint}"
     );
     assert_eq!(folder.names(), ["scene.toml"], "a failed run writes nothing");
+}
+
+#[test]
+fn a_scene_without_a_rig_runs_uncalibrated_and_an_outdated_rig_is_followed_as_far_as_it_is_right() {
+    let folder = Folder::new("servo-uncalibrated");
+    let (text, _) = folder.expect(0, "servo ur5-uncalibrated");
+    assert!(text.contains("converged"), "{text}");
+    // Nothing said of a controller: uncalibrated where there is no rig.
+    let scene = SCENE.replace("[target]", "[tracker]\nsd = 0.3\n[target]") + "[loop]\nwindow = 60\ntolerance_px = 3\n";
+    folder.write("scene.toml", &scene);
+    let (json, _) = folder.expect(0, "servo scene.toml --json");
+    let explored: Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(explored["stop"], "converged");
+    let catalogue = catalog::rig("ur5").unwrap();
+    let mut moved = catalogue.clone();
+    moved.cameras[0].pose.as_mut().unwrap().translation.x += 0.1;
+    folder.write("moved.toml", &moved.to_toml());
+    let hybrid = format!("{scene}[controller]\nkind = \"hybrid\"\npixels = 0.3\n");
+    folder.write("hybrid.toml", &hybrid);
+    let (json, _) = folder.expect(0, "servo moved.toml hybrid.toml --json");
+    let followed: Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(followed["stop"], "converged");
+    let commands = |run: &Value| run["commands"].as_u64().unwrap();
+    assert!(2 * commands(&followed) <= commands(&explored), "{} and {}", commands(&followed), commands(&explored));
+}
+
+#[test]
+fn what_an_uncalibrated_scene_cannot_do_is_said_with_its_place() {
+    let folder = Folder::new("servo-uncalibrated-mistakes");
+    let refuse = |scene: &str, arguments: &str, what: &str| {
+        folder.write("scene.toml", scene);
+        let (_, error) = folder.expect(2, arguments);
+        assert!(error.contains(what), "{error}");
+    };
+    let with = |more: &str| format!("{SCENE}{more}");
+    let own = "servo scene.toml";
+    refuse(&with("[controller]\nkind = \"image-based\""), own, "kind image-based needs a rig");
+    refuse(&with("[controller]\nkind = \"hybrid\""), own, "kind hybrid needs a rig");
+    refuse(&with("[limits]\ntip_speed = 1.0"), own, "need a rig");
+    refuse(
+        &with("[controller]\nkind = \"uncalibrated\"\nmatrix = \"mean\""),
+        own,
+        "scene.toml:6:2: controller: `matrix`",
+    );
+    refuse(&with("[controller]\npixels = 1"), own, "`pixels` (noise of the trackers)");
+    refuse(&SCENE.replace("[target]", "takes = \"pose-deltas\"\n[target]"), own, "moves joints");
+    refuse(&SCENE.replace("rig = \"ur5\"\n", ""), own, "names no `rig`");
+    let fault = |text: &str| with(&format!("[tracker]\nfaults = [{{ {text} }}]\n"));
+    refuse(&fault("camera = \"left\", kind = \"lost\""), own, "faults: has no `feature`");
+    refuse(&fault("camera = \"left\", feature = \"f1\", kind = \"drift\""), own, "has no `by`");
+    refuse(
+        &fault("camera = \"left\", feature = \"f1\", kind = \"lost\", by = [1, 0]"),
+        own,
+        "`by` is for jump and drift",
+    );
+    refuse(
+        &fault("camera = \"left\", feature = \"f1\", kind = \"lost\", from = 3, until = 2"),
+        own,
+        "before it begins",
+    );
+    refuse(&fault("camera = \"top\", feature = \"f1\", kind = \"lost\""), own, "camera `top`, which its rig has not");
 }

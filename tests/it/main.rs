@@ -41,6 +41,7 @@ mod suggest;
 mod targets;
 mod tidy;
 mod uncalibrated;
+mod uncalibrated_joints;
 mod urdf;
 mod urdf_out;
 mod visual_servo;

@@ -202,11 +202,7 @@ impl Controller for Restless {
     fn aim(&mut self, _goal: &[Sighting]) {}
 
     fn decide(&mut self, _: &Measurement<'_>, _: &[&dyn Limit], _: f64) -> Result<Decision, Error> {
-        Ok(Decision {
-            command: Command::JointDelta(vec![0.05, 0.0, 0.0, 0.0, 0.0, 0.0]),
-            active: Vec::new(),
-            conflict: Vec::new(),
-        })
+        Ok(Decision::free(Command::JointDelta(vec![0.05, 0.0, 0.0, 0.0, 0.0, 0.0])))
     }
 }
 

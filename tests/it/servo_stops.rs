@@ -17,7 +17,7 @@ impl Controller for Stubborn {
 
     fn decide(&mut self, _: &Measurement<'_>, _: &[&dyn Limit], _: f64) -> Result<Decision, Error> {
         let command = Command::JointDelta(vec![self.1, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        let decision = Decision { command, active: Vec::new(), conflict: Vec::new() };
+        let decision = Decision::free(command);
         self.0.map_or(Ok(decision), |why| Err(Error::NotEnoughData(why.to_owned())))
     }
 }

@@ -1,7 +1,8 @@
 //! The controller: explores, servoes, and stops where it must.
 use super::checks::check;
-use super::estimate::Estimate;
+use super::estimate::{Estimate, dot};
 use super::exploration::{Explorer, Next};
+use super::foresight::{Ahead, Foresight};
 use super::learning::{Lesson, learn};
 use super::settings::Settings;
 use super::signals::{Command, Phase, Quantity, Row, Stop};
@@ -9,7 +10,7 @@ use super::trust::Aim;
 use super::views::coinciding;
 use crate::Error;
 use crate::rig::Limits;
-use crate::servo::{JointBounds, LimitRows, MotionSolver, TaskRows};
+use crate::servo::{Active, Constraint, JointBounds, LimitRows, MotionSolver, Step, TaskRows};
 
 /// Servoing without a rig: quantities are moved so that rows of errors become 0. Kept from step to step.
 pub struct Uncalibrated {
@@ -18,6 +19,8 @@ pub struct Uncalibrated {
     limits: Vec<Limits>,
     rows: Vec<Row>,
     phase: Phase,
+    /// What a model says, which then takes the place of exploring.
+    ahead: Option<Ahead>,
     /// While exploring.
     explorer: Option<Explorer>,
     estimate: Option<Estimate>,
@@ -34,11 +37,15 @@ pub struct Uncalibrated {
     velocity: Vec<f64>,
     /// Rows that are seen now.
     seen: Vec<usize>,
+    /// Rows of which the exploration found out nothing.
+    dropped: Vec<usize>,
     aim: Aim,
     bounds: JointBounds,
     tasks: [TaskRows; 1],
     solver: MotionSolver,
     motion: Vec<f64>,
+    active: Vec<Active>,
+    conflict: Vec<Constraint>,
 }
 
 /// Times that a lost Jacobian is replaced, by the last good one and by a fresh exploration in turns, before it is given up.
@@ -56,6 +63,7 @@ impl Uncalibrated {
         Ok(Uncalibrated {
             limits: quantities.iter().map(|quantity| quantity.limits).collect(),
             phase: Phase::default(),
+            ahead: None,
             explorer: None,
             estimate: None,
             good: None,
@@ -66,11 +74,14 @@ impl Uncalibrated {
             moved: vec![0.0; n],
             velocity: vec![0.0; n],
             seen: Vec::new(),
+            dropped: Vec::new(),
             aim: Aim::default(),
             bounds: JointBounds::default(),
             tasks: [TaskRows::default()],
             solver: MotionSolver::new(0.0),
             motion: vec![0.0; n],
+            active: Vec::new(),
+            conflict: Vec::new(),
             settings,
             quantities,
             rows,
@@ -88,8 +99,38 @@ impl Uncalibrated {
         (self.estimate, self.explorer, self.phase) = (Some(estimate), None, Phase::Servoing);
         (self.good, self.losses) = (None, 0);
         self.unmeasured = (0..m).collect();
+        self.dropped.clear();
         self.readings.clear();
         self.errors.clear();
+        Ok(())
+    }
+
+    /// Begins with what a model says instead of exploring, and follows it as far as it is right: what is measured corrects its slopes, and
+    /// those of a camera of which it turns out to be wrong are learned anew on the way.
+    pub fn begin_with_model(&mut self, model: Box<dyn Foresight>) {
+        (self.ahead, self.explorer, self.estimate) = (Some(Ahead::new(model)), None, None);
+        (self.good, self.losses) = (None, 0);
+        self.unmeasured.clear();
+        self.dropped.clear();
+        self.readings.clear();
+        self.errors.clear();
+    }
+
+    /// What shall be seen has moved: errors change by this much [px] without any motion, one number per row.
+    ///
+    /// Errors: [`Error::Unusable`] where there are not as many numbers as rows, or one is not finite.
+    pub fn shift(&mut self, changes: &[f64]) -> Result<(), Error> {
+        if changes.len() != self.rows.len() || changes.iter().any(|change| !change.is_finite()) {
+            let (found, m) = (changes.len(), self.rows.len());
+            return Err(Error::Unusable(format!("{found} changes of errors, where {m} finite ones are wanted")));
+        }
+        self.errors.iter_mut().zip(changes).for_each(|(error, change)| *error += change);
+        if let Some(explorer) = &mut self.explorer {
+            explorer.shift(changes);
+        }
+        for estimate in [&mut self.estimate, &mut self.good].into_iter().flatten() {
+            changes.iter().enumerate().for_each(|(row, change)| estimate.shift(row, *change));
+        }
         Ok(())
     }
 
@@ -126,8 +167,10 @@ impl Uncalibrated {
             )));
         }
         self.motion.fill(0.0);
+        self.active.clear();
+        self.conflict.clear();
         if matches!(self.phase, Phase::Stopped(_)) {
-            return Ok(Command { motion: &self.motion, phase: &self.phase });
+            return Ok(self.command());
         }
         self.phase = match self.readable(readings, dt) {
             Err(reason) => Phase::Waiting(reason),
@@ -144,7 +187,11 @@ impl Uncalibrated {
         if matches!(self.phase, Phase::Waiting(_) | Phase::Stopped(_)) {
             self.motion.fill(0.0);
         }
-        Ok(Command { motion: &self.motion, phase: &self.phase })
+        Ok(self.command())
+    }
+
+    fn command(&self) -> Command<'_> {
+        Command { motion: &self.motion, phase: &self.phase, active: &self.active, conflict: &self.conflict }
     }
 
     fn readable(&self, readings: &[f64], dt: f64) -> Result<(), String> {
@@ -161,10 +208,22 @@ impl Uncalibrated {
         }
         self.bounds.update(&self.limits, readings, &self.velocity, dt);
         self.seen.clear();
-        self.seen.extend((0..errors.len()).filter(|row| errors[*row].is_finite()));
+        self.seen.extend((0..errors.len()).filter(|row| errors[*row].is_finite() && !self.dropped.contains(row)));
     }
 
     fn decide(&mut self, readings: &[f64], errors: &[f64], limits: &LimitRows) -> Phase {
+        if let (Some(ahead), None) = (&mut self.ahead, &self.estimate) {
+            let sds: Vec<f64> = self.rows.iter().map(|row| row.sd).collect();
+            self.estimate = ahead.begin(&sds, (readings, errors), self.settings.curvature);
+            if self.estimate.is_some() {
+                self.unmeasured = (0..errors.len()).collect();
+            } else {
+                // A model that says nothing is none.
+                self.ahead = None;
+            }
+        } else if let (Some(ahead), Some(estimate)) = (&mut self.ahead, &mut self.estimate) {
+            ahead.arrive(readings, estimate);
+        }
         let (Some(estimate), None) = (&mut self.estimate, &self.explorer) else {
             return self.explore(readings, errors, limits);
         };
@@ -181,8 +240,12 @@ impl Uncalibrated {
             of_known = self.seen.iter().copied().filter(|row| !unmeasured.contains(row)).collect();
             &of_known
         };
-        let lesson = Lesson { motion: &self.moved, before: &self.errors, now: errors, seen };
+        let modelled = self.ahead.is_some().then_some(&self.rows[..]);
+        let lesson = Lesson { motion: &self.moved, before: &self.errors, now: errors, seen, modelled };
         learn(self.settings.update, self.settings.curvature, estimate, &lesson);
+        if let (Some(ahead), false) = (&self.ahead, self.readings.is_empty()) {
+            ahead.carry_half(estimate);
+        }
         // The first error of a row is no surprise to its slopes.
         unmeasured.retain(|&row| {
             let is_seen = errors[row].is_finite();
@@ -215,7 +278,7 @@ impl Uncalibrated {
                 for (i, (there, here)) in there.iter().zip(readings).enumerate() {
                     self.tasks[0].push((0..n).map(|k| if k == i { 1.0 } else { 0.0 }), there - here, 1.0);
                 }
-                self.motion.copy_from_slice(&self.solver.solve(&self.tasks, limits, &self.bounds).motion);
+                self.solve(limits);
                 Phase::Exploring
             }
             Next::Done(mut estimate) => {
@@ -226,7 +289,9 @@ impl Uncalibrated {
                          see from more sides, or more features"
                     )));
                 }
+                self.dropped = explorer.dropped().collect();
                 self.explorer = None;
+                self.seen.retain(|row| !self.dropped.contains(row));
                 self.seen.iter().for_each(|&row| estimate.reset(row, errors[row]));
                 self.estimate = Some(*estimate);
                 self.servo(readings, errors, limits)
@@ -245,12 +310,18 @@ impl Uncalibrated {
         if !determined || condition > worst {
             return self.lost(readings, errors, limits);
         }
-        if worst.is_finite() && condition < worst / GOOD && self.seen.len() == errors.len() {
+        if worst.is_finite() && condition < worst / GOOD && self.seen.len() + self.dropped.len() == errors.len() {
             match &mut self.good {
                 Some(good) => good.clone_from(estimate),
                 none => *none = Some(estimate.clone()),
             }
         }
+        let removable = self.aim.removable();
+        let longest = self.settings.trust.map_or(f64::INFINITY, |trust| trust.motion);
+        let middle = match &mut self.ahead {
+            Some(ahead) => ahead.refine(estimate, readings, &self.seen, longest, &mut self.aim),
+            None => None,
+        };
         let mut share = self.settings.gain;
         if let Some(trust) = &self.settings.trust {
             share *= self.aim.share(estimate, &self.seen, share, trust, 0.5 * self.settings.divergence);
@@ -263,18 +334,20 @@ impl Uncalibrated {
         if swallowed(share, 2.0) {
             share = 1.0;
         }
-        let converged = self.aim.removable() <= n as f64 + 2.0 * (2.0 * n as f64).sqrt() || swallowed(1.0, 1.0);
+        let converged = removable <= n as f64 + 2.0 * (2.0 * n as f64).sqrt() || swallowed(1.0, 1.0);
         self.tasks[0].clear(n);
         for &row in &self.seen {
-            let slopes = estimate.slopes(row).iter().copied();
-            self.tasks[0].push(slopes, -estimate.error(row), estimate.variance(row).sqrt());
+            let slopes = middle.unwrap_or(estimate).slopes(row);
+            let wanted = if middle.is_some() { dot(slopes, &self.aim.motion) } else { -estimate.error(row) };
+            let sd = middle.unwrap_or(estimate).variance(row).sqrt();
+            self.tasks[0].push(slopes.iter().copied(), wanted, sd);
         }
         if restraint > 0.0 {
             let sd = self.aim.damping.sqrt().recip();
             (0..n).for_each(|i| self.tasks[0].push((0..n).map(|k| if k == i { 1.0 } else { 0.0 }), 0.0, sd));
         }
         self.tasks[0].share(0, share);
-        self.motion.copy_from_slice(&self.solver.solve(&self.tasks, limits, &self.bounds).motion);
+        self.solve(limits);
         for (motion, quantity) in self.motion.iter_mut().zip(&self.quantities) {
             if motion.abs() < quantity.dead_band {
                 *motion = 0.0;
@@ -283,10 +356,17 @@ impl Uncalibrated {
         if converged { Phase::Converged } else { Phase::Servoing }
     }
 
+    fn solve(&mut self, limits: &LimitRows) {
+        let Step { motion, active, conflict, .. } = self.solver.solve(&self.tasks, limits, &self.bounds);
+        self.motion.copy_from_slice(motion);
+        self.active.extend_from_slice(active);
+        self.conflict.extend_from_slice(conflict);
+    }
+
     /// The Jacobian does not determine a motion any more.
     fn lost(&mut self, readings: &[f64], errors: &[f64], limits: &LimitRows) -> Phase {
         let [seen, all] = [self.seen.len(), errors.len()];
-        if seen < all {
+        if seen + self.dropped.len() < all {
             return Phase::Waiting(format!("{seen} of {all} rows are seen, which do not determine a motion"));
         }
         self.losses += 1;
@@ -300,7 +380,10 @@ impl Uncalibrated {
                 self.servo(readings, errors, limits)
             }
             None => {
-                self.estimate = None;
+                (self.estimate, self.ahead) = (None, None);
+                self.dropped.clear();
+                self.seen.clear();
+                self.seen.extend((0..errors.len()).filter(|row| errors[*row].is_finite()));
                 self.explore(readings, errors, limits)
             }
         }

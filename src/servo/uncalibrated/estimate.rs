@@ -197,6 +197,56 @@ impl Estimate {
         entries[0] = self.variances[row];
     }
 
+    /// What shall be seen has moved: a row's error with it [px].
+    pub(super) fn shift(&mut self, row: usize, by: f64) {
+        self.states[row * (self.n + 1)] += by;
+    }
+
+    /// Counts a row's errors as less certain by what is not known of its slopes along a motion.
+    pub(super) fn doubt_along(&mut self, row: usize, motion: &[f64]) {
+        self.variances[row] += self.doubt(row, motion);
+    }
+
+    /// Adds to a row's slopes a share of what a model says they have changed by.
+    pub(super) fn carry(&mut self, row: usize, share: f64, [before, now]: [&[f64]; 2]) {
+        let size = self.n + 1;
+        let slopes = &mut self.states[row * size + 1..(row + 1) * size];
+        let changes = before.iter().zip(now).map(|(before, now)| share * (now - before));
+        slopes.iter_mut().zip(changes).for_each(|(slope, change)| *slope += change);
+    }
+
+    /// Variance of what is to be measured of a row [px²], and what is expected.
+    pub(super) fn expected(&self, row: usize) -> [f64; 2] {
+        let size = self.n + 1;
+        [self.states[row * size], self.covariances[row * size * size] + self.variances[row]]
+    }
+
+    /// What a row's error is expected to be after a motion [px], and the variance of what is then measured [px²].
+    pub fn foresee(&self, row: usize, motion: &[f64]) -> [f64; 2] {
+        [self.error(row) + dot(self.slopes(row), motion), self.variance_along(row, motion)]
+    }
+
+    /// Variance of a row that is measured after a motion [px²].
+    pub fn variance_along(&self, row: usize, motion: &[f64]) -> f64 {
+        let size = self.n + 1;
+        let entries = &self.covariances[row * size * size..(row + 1) * size * size];
+        let bend = 0.25 * (self.curvature * dot(motion, motion)).powi(2) * self.scales[row];
+        let across = dot(&entries[1..size], motion);
+        entries[0] + 2.0 * across + self.doubt(row, motion) + bend + (1.0 + WANDER * WANDER) * self.variances[row]
+    }
+
+    /// Each of a row's slopes was less certain before the last motion by this variance.
+    pub(super) fn loosen(&mut self, row: usize, variance: f64, motion: &[f64]) {
+        let size = self.n + 1;
+        let entries = &mut self.covariances[row * size * size..(row + 1) * size * size];
+        entries[0] += variance * dot(motion, motion);
+        for (i, motion) in motion.iter().enumerate() {
+            entries[i + 1] += variance * motion;
+            entries[(i + 1) * size] += variance * motion;
+            entries[(i + 1) * size + i + 1] += variance;
+        }
+    }
+
     /// Forgets: the covariance of all slopes grows by a factor.
     pub(super) fn forget(&mut self, factor: f64) {
         let size = self.n + 1;

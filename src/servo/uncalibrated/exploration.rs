@@ -19,10 +19,16 @@ pub(super) struct Explorer {
     /// How far from a waypoint dead bands may leave it.
     slack: f64,
     waits: usize,
+    /// Steps for which a row was missing where everything else was ready, and the rows that were given up for it.
+    missing: usize,
+    dropped: Vec<bool>,
 }
 
 /// How near a waypoint must be, as a share of the motion to it.
 const NEAR: f64 = 0.05;
+
+/// Steps that trackers are waited for before the exploration goes on without them.
+const LOST: usize = 5;
 
 /// Steps that a waypoint, and trackers there, are waited for.
 const PATIENCE: usize = 200;
@@ -61,7 +67,14 @@ impl Explorer {
             size: settings.size,
             slack: quantities.iter().map(|quantity| quantity.dead_band.powi(2)).sum::<f64>().sqrt(),
             waits: 0,
+            missing: 0,
+            dropped: vec![false; errors.len()],
         }
+    }
+
+    /// Rows whose trackers were lost on the way, of which nothing is known.
+    pub fn dropped(&self) -> impl Iterator<Item = usize> {
+        self.dropped.iter().enumerate().filter(|(_, dropped)| **dropped).map(|(row, _)| row)
     }
 
     /// From what is seen where things are now.
@@ -70,8 +83,25 @@ impl Explorer {
         let k = self.motions.len();
         let waypoint = self.waypoint();
         let away: f64 = waypoint.iter().zip(at).map(|(there, here)| (there - here).powi(2)).sum();
-        let there = away.sqrt() <= self.slack.max(NEAR * self.size) && errors.iter().all(|error| error.is_finite());
+        let arrived = away.sqrt() <= self.slack.max(NEAR * self.size);
+        let is_seen = errors.iter().zip(&self.dropped).all(|(error, dropped)| *dropped || error.is_finite());
         self.waits += 1;
+        if arrived && !is_seen {
+            self.missing += 1;
+            if self.missing < LOST {
+                return Next::Towards(waypoint);
+            }
+            self.dropped.iter_mut().zip(errors).for_each(|(dropped, error)| *dropped |= !error.is_finite());
+            let left = self.dropped.iter().filter(|dropped| !**dropped).count();
+            if left < at.len() {
+                let n = at.len();
+                return Next::Failed(format!(
+                    "trackers were lost while exploring: the {left} rows that are left do not determine {n} quantities"
+                ));
+            }
+        }
+        self.missing = 0;
+        let there = arrived;
         if self.waits == 1 || !there && self.waits < PATIENCE {
             return Next::Towards(waypoint);
         }
@@ -79,7 +109,8 @@ impl Explorer {
             return self.estimate(rows, curvature);
         }
         let motion: Vec<f64> = at.iter().zip(&self.start).map(|(now, start)| now - start).collect();
-        let change: Vec<f64> = errors.iter().zip(&self.errors).map(|(now, start)| now - start).collect();
+        let change = errors.iter().zip(&self.errors).zip(&self.dropped);
+        let change: Vec<f64> = change.map(|((now, start), dropped)| if *dropped { 0.0 } else { now - start }).collect();
         if change.iter().any(|change| !change.is_finite()) {
             return Next::Failed("a tracker was lost while exploring".to_owned());
         }
@@ -97,6 +128,11 @@ impl Explorer {
         Next::Towards(self.waypoint())
     }
 
+    /// What shall be seen has moved, and all errors with it [px].
+    pub fn shift(&mut self, changes: &[f64]) {
+        self.errors.iter_mut().zip(changes).for_each(|(error, change)| *error += change);
+    }
+
     fn waypoint(&self) -> Vec<f64> {
         match self.directions.get(self.motions.len()) {
             Some(direction) => {
@@ -110,7 +146,8 @@ impl Explorer {
     fn estimate(&self, rows: &[Row], curvature: f64) -> Next {
         let (n, k) = (self.start.len(), self.motions.len());
         let motions = DMatrix::from_fn(k, n, |motion, i| self.motions[motion][i]);
-        let changes = DMatrix::from_fn(k, rows.len(), |motion, row| self.changes[motion][row]);
+        let change = |motion: usize, row: usize| if self.dropped[row] { 0.0 } else { self.changes[motion][row] };
+        let changes = DMatrix::from_fn(k, rows.len(), change);
         let Some(inverse) = (motions.transpose() * &motions).try_inverse() else {
             return Next::Failed("the exploratory motions do not move every quantity".to_owned());
         };

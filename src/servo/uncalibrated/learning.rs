@@ -1,6 +1,7 @@
 //! What a motion teaches: the updates of an estimate.
 use super::estimate::{Estimate, dot};
 use super::settings::Update;
+use super::signals::Row;
 
 /// A motion, and the errors before and after it [px]; NaN where a row was not seen.
 pub(super) struct Lesson<'a> {
@@ -9,11 +10,17 @@ pub(super) struct Lesson<'a> {
     pub now: &'a [f64],
     /// Rows that are seen now.
     pub seen: &'a [usize],
+    /// The rows, where slopes came from a model: a camera of which it is found wrong is trusted less.
+    pub modelled: Option<&'a [Row]>,
 }
 
 /// Bounds of the ratio of a squared surprise to the expected one by which the curvature follows, and of the curvature over its setting.
 const SURPRISE: [f64; 2] = [0.2, 5.0];
 const CURVATURES: [f64; 2] = [0.5, 3.0];
+
+/// Median of χ² with 1 degree of freedom, and by how much the ratio may exceed that of the median row.
+const MEDIAN: f64 = 0.455;
+const ALONE: f64 = 3.0;
 
 /// Learns. `curvature`: the setting.
 pub(super) fn learn(update: Update, curvature: f64, estimate: &mut Estimate, lesson: &Lesson<'_>) {
@@ -64,16 +71,53 @@ fn tells(estimate: &Estimate, lesson: &Lesson<'_>, gate: f64) -> bool {
 
 fn filter(setting: f64, estimate: &mut Estimate, lesson: &Lesson<'_>) {
     estimate.moved(lesson.motion, estimate.curvature);
+    if let Some(rows) = lesson.modelled {
+        doubt(rows, estimate, lesson);
+    }
     let (mut surprise, mut expected, mut noise) = (0.0, 0.0, 0.0);
+    let mut each = Vec::with_capacity(lesson.seen.len());
     for &row in lesson.seen {
         let [difference, variance] = estimate.measured(row, lesson.now[row]);
+        each.push(difference * difference / variance);
         surprise += difference * difference;
         expected += variance;
         noise += 2.0 * estimate.variance(row);
     }
     if expected > noise {
-        let ratio = (surprise / expected).clamp(SURPRISE[0], SURPRISE[1]);
+        // A few trackers that fail say nothing of how slopes change: half of the rows have to be surprised too.
+        let middle = each.len() / 2;
+        let median = *each.select_nth_unstable_by(middle, f64::total_cmp).1 / MEDIAN;
+        let ratio = (surprise / expected).min(ALONE * median).clamp(SURPRISE[0], SURPRISE[1]);
         let curvature = estimate.curvature * ratio.powf(0.25 * (1.0 - noise / expected));
         estimate.curvature = curvature.clamp(CURVATURES[0] * setting, CURVATURES[1] * setting);
+    }
+}
+
+/// Surprises of one camera's rows that are larger than their variances by so many standard deviations of their χ² speak against the model.
+const SURPRISED: f64 = 5.0;
+
+/// Raises the variance of the slopes of each camera that surprises to what explains the surprise best: one camera has moved, or all have
+/// as the arm did, and slopes are learned anew while those of the others stay.
+fn doubt(rows: &[Row], estimate: &mut Estimate, lesson: &Lesson<'_>) {
+    let square = dot(lesson.motion, lesson.motion);
+    if square == 0.0 {
+        return;
+    }
+    let cameras = 1 + lesson.seen.iter().map(|&row| rows[row].camera).max().unwrap_or(0);
+    for camera in 0..cameras {
+        let of_camera = || lesson.seen.iter().copied().filter(|&row| rows[row].camera == camera);
+        let (mut ratio, mut excess, mut scale, mut count) = (0.0, 0.0, 0.0, 0.0_f64);
+        for row in of_camera() {
+            let [expected, variance] = estimate.expected(row);
+            let surprise = (lesson.now[row] - expected).powi(2);
+            ratio += surprise / variance;
+            excess += surprise - variance;
+            scale += estimate.scale(row);
+            count += 1.0;
+        }
+        if ratio > count + SURPRISED * (2.0 * count).sqrt() && scale > 0.0 && excess > 0.0 {
+            let share = excess / (square * scale);
+            of_camera().for_each(|row| estimate.loosen(row, share * estimate.scale(row), lesson.motion));
+        }
     }
 }

@@ -8,6 +8,7 @@ mod checks;
 mod controller;
 mod estimate;
 mod exploration;
+mod foresight;
 mod learning;
 mod settings;
 mod signals;
@@ -16,5 +17,6 @@ mod views;
 
 pub use controller::Uncalibrated;
 pub use estimate::Estimate;
+pub use foresight::Foresight;
 pub use settings::{Exploration, Settings, Trust, Update};
 pub use signals::{Command, Phase, Quantity, Row, Stop};

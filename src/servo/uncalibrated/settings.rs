@@ -100,6 +100,17 @@ impl Settings {
             ..Settings::default()
         }
     }
+
+    /// For a model that takes the place of exploring: whole steps, no restraint, and a curvature that is what the model misses of it.
+    pub fn with_rig() -> Self {
+        Settings {
+            gain: 1.0,
+            curvature: 0.05,
+            divergence: 1000.0,
+            trust: Some(Trust { motion: 3.0, restraint: 0.0, ..Trust::default() }),
+            ..Settings::default()
+        }
+    }
 }
 
 impl Default for Exploration {

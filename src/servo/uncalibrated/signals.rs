@@ -1,5 +1,6 @@
 //! What goes into uncalibrated servoing and what comes out.
 use crate::rig::Limits;
+use crate::servo::{Active, Constraint};
 
 /// Something that is controlled.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,6 +29,10 @@ pub struct Command<'a> {
     pub motion: &'a [f64],
     /// Why.
     pub phase: &'a Phase,
+    /// What holds the motion back.
+    pub active: &'a [Active],
+    /// Constraints that cannot all hold, where a limit gave way.
+    pub conflict: &'a [Constraint],
 }
 
 /// What is being done.

@@ -1,8 +1,10 @@
 //! Worlds for closed loops: a robot that carries out commands inexactly, cameras and trackers, things to grasp.
+mod fault;
 mod object;
 mod robot;
 mod tracker;
 
+pub use fault::{Fault, FaultKind};
 pub use object::Object;
 pub use robot::Execution;
 pub use tracker::Tracker;
@@ -29,6 +31,8 @@ pub struct WorldOptions {
     pub readings: Option<f64>,
     /// How trackers err.
     pub tracker: Tracker,
+    /// Trackers that fail at times.
+    pub faults: Vec<Fault>,
     /// Probability that a feature in view is not reported, in [0, 1].
     pub missed: f64,
     /// What is read and seen is this old [s].
@@ -44,6 +48,7 @@ impl Default for WorldOptions {
             execution: Execution::default(),
             readings: Some(0.0),
             tracker: Tracker::Exact,
+            faults: Vec::new(),
             missed: 0.0,
             latency: 0.0,
             seed: 1,
@@ -65,6 +70,8 @@ pub struct World {
     joints: Vec<f64>,
     /// Where the joints and objects were, as long ago as the latency reaches.
     past: VecDeque<(f64, Vec<f64>, Vec<Object>)>,
+    /// What trackers with faults reported last [px], in the order of the faults.
+    reported: Vec<Option<[f64; 2]>>,
     executing: ChaCha8Rng,
     observing: ChaCha8Rng,
 }
@@ -114,6 +121,7 @@ impl World {
             time: 0.0,
             joints: joints.to_vec(),
             past: VecDeque::from([(0.0, joints.to_vec(), Vec::new())]),
+            reported: vec![None; options.faults.len()],
             executing: stream(EXECUTING),
             observing: stream(OBSERVING),
             options,
@@ -210,6 +218,16 @@ impl World {
             detection.pixel = tracker.report(detection.pixel, random);
             is_seen
         });
+        for (fault, reported) in self.options.faults.iter().zip(&mut self.reported) {
+            let Some(&feature) = self.places.get(fault.feature) else { continue };
+            let of_fault = |seen: &Detection| (seen.camera as usize, seen.feature) == (fault.camera, feature);
+            if let Some(at) = pixels.iter().position(of_fault) {
+                match fault.report(pixels[at].pixel, *reported, time) {
+                    Some(pixel) => (pixels[at].pixel, *reported) = (pixel, Some(pixel)),
+                    None => drop(pixels.remove(at)),
+                }
+            }
+        }
         Sample { time: Some(time), joints: readings, pixels, ..Sample::default() }
     }
 

@@ -20,6 +20,8 @@ pub struct Execution {
     pub pose: PoseNoise,
     /// Standard deviation in proportion to the motion, of each joint or of each coordinate of the tip's motion.
     pub share: f64,
+    /// Motions of a joint that are smaller than this are not carried out [rad or m].
+    pub dead_band: f64,
     /// Executed over commanded motion, one per joint; empty for exact ones.
     pub gain: Vec<f64>,
 }
@@ -76,6 +78,7 @@ impl Robot {
         let noise = &self.execution;
         let moved = motion.iter().enumerate().map(|(i, motion)| {
             let gain = noise.gain.get(i).copied().unwrap_or(1.0);
+            let motion = if motion.abs() < noise.dead_band { &0.0 } else { motion };
             joints[i] + gain * motion + noise.joints * normal() + noise.share * motion * normal()
         });
         let mut after: Vec<f64> = moved.collect();
@@ -145,10 +148,13 @@ impl Execution {
             let found = self.gain.len();
             return Err(Error::Unusable(format!("{found} gains are given, the robot has {n} joints")));
         }
-        let numbers = [self.joints, self.pose.xyz, self.pose.rot, self.share];
+        let numbers = [self.joints, self.pose.xyz, self.pose.rot, self.share, self.dead_band];
         if numbers.iter().any(|sd| !(0.0..f64::INFINITY).contains(sd)) || self.gain.iter().any(|gain| !gain.is_finite())
         {
-            return Err(Error::Unusable("noise and gains of a robot must be finite, and noise 0 or more".to_owned()));
+            return Err(Error::Unusable(
+                "noise, gains and the dead band of a robot must be finite, and noise and dead band 0 or more"
+                    .to_owned(),
+            ));
         }
         Ok(())
     }
