@@ -89,6 +89,7 @@ pub const ALL: &[Experiment] = &[
     camera_rotation::TABLE5_1,
     camera_rotation::TABLE5_2,
     camera_rotation::TABLE5_3,
+    camera_rotation::FIGURE5_10,
 ];
 
 /// The experiment of that name.
