@@ -42,10 +42,10 @@ pub(super) struct Null {
 }
 
 /// Exact geometry: errors above this are none [px].
-pub(super) const EXACT: f64 = 1e-6;
+pub(super) const EXACT: f64 = 1e-4;
 
 /// Slopes below this share of the largest are rounding.
-const RELATIVE: f64 = 1e-6;
+const RELATIVE: f64 = 1e-5;
 
 impl<'a> Problem<'a> {
     pub fn new(task: &'a ImageTask, geometry: &Geometry) -> Self {
@@ -139,7 +139,10 @@ impl<'a> Problem<'a> {
             let gradient: Vector6<f64> = gradient.fixed_rows::<6>(0).into_owned();
             let largest = hessian.diagonal().max().max(f64::MIN_POSITIVE);
             let damped = hessian + Matrix6::identity() * (damping * largest);
-            let Some(factor) = damped.cholesky() else { return None };
+            let Some(factor) = damped.cholesky() else {
+                damping *= 10.0;
+                continue;
+            };
             let motion = -factor.solve(&gradient);
             if motion.norm() < 1e-13 {
                 is_still = true;
@@ -149,9 +152,9 @@ impl<'a> Problem<'a> {
             let (tried, tried_slopes) = self.linearize(&next);
             let after = cost(&tried);
             if after < best {
-                let small = best - after < 1e-14 * best || after < 1e-26;
+                let small = best - after < 1e-10 * best || after < 1e-26;
                 (pose, errors, slopes, best) = (next, tried, tried_slopes, after);
-                damping = (0.1 * damping).max(1e-14);
+                damping = (0.1 * damping).max(1e-12);
                 if small {
                     is_still = true;
                     break;
