@@ -159,7 +159,7 @@ fn servoing_without_a_rig_reaches_tasks_of_every_kind_through_the_motions_that_t
             // Within what the trackers' noise leaves.
             let left = task.errors(&geometry.see(&task, &pose(&at)));
             let worst = left.iter().map(|row| row.error.abs() / row.sd).fold(0.0, f64::max);
-            assert!(worst < 4.0, "{name}, seed {seed}: {worst} standard deviations are left");
+            assert!(worst < 4.0, "{name}, seed {seed}: {worst} standard deviations are left, {:?}", servo.phase());
         }
     }
 }

@@ -13,11 +13,45 @@ const SIZE: f64 = 0.1;
 /// Distance of the cameras from what they see, in sizes of it.
 const AWAY: f64 = 8.0;
 
+/// Draws, of which the one that fixes most is kept.
+const ATTEMPTS: usize = 6;
+
 impl Geometry {
     /// Two cameras at about a right angle, or as many as the task has, and features in general position where the task does not say where they
     /// are: such that the hand at the identity solves it, as far as what is given allows. Points of conics are on circles.
     pub fn drawn(task: &ImageTask, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut best: Option<(usize, Geometry)> = None;
+        // Some are no general position: a point and a line in one plane with both cameras look alike whether they meet or not.
+        for _ in 0..ATTEMPTS {
+            let drawn = Geometry::draw(task, &mut random);
+            let rank = drawn.rank(task);
+            if best.as_ref().is_none_or(|(most, _)| rank > *most) {
+                best = Some((rank, drawn));
+            }
+        }
+        best.map_or(Geometry { cameras: Vec::new(), points: Vec::new() }, |(_, drawn)| drawn)
+    }
+
+    /// Degrees of freedom that the task fixes with the hand at the identity.
+    fn rank(&self, task: &ImageTask) -> usize {
+        let points = &self.points;
+        let middle = mean(points).unwrap_or_default();
+        let size = points.iter().map(|point| (point - middle).norm()).fold(1e-3, f64::max);
+        // Rotations are about the middle of everything.
+        let moved = |lane: usize, by: f64| {
+            let unit = Vector3::ith(lane % 3, by);
+            let pose =
+                if lane < 3 { Pose::new(unit, Vector3::zeros()) } else { Pose::new(Vector3::zeros(), unit * size) };
+            let shift = middle - pose.rotation * middle;
+            DVector::from_vec(self.errors(task, &Pose { translation: pose.translation + shift, ..pose }))
+        };
+        let slopes = (0..6).map(|lane| (moved(lane, 1e-5) - moved(lane, -1e-5)) / 2e-5).collect::<Vec<_>>();
+        let values = DMatrix::from_columns(&slopes).singular_values();
+        values.iter().filter(|value| **value > 1e-4 * values.max()).count()
+    }
+
+    fn draw(task: &ImageTask, random: &mut ChaCha8Rng) -> Self {
         let given: Vec<Vector3<f64>> = task.features().iter().filter_map(given_place).collect();
         let centre = mean(&given).unwrap_or_default();
         let spread = given.iter().map(|point| (point - centre).norm()).fold(0.0, f64::max);
@@ -25,15 +59,15 @@ impl Geometry {
         let mut points: Vec<Vector3<f64>> = task
             .features()
             .iter()
-            .map(|feature| feature.place.xyz().unwrap_or_else(|| centre + size * in_ball(&mut random)))
+            .map(|feature| feature.place.xyz().unwrap_or_else(|| centre + size * in_ball(random)))
             .collect();
         let is_drawn = |index: usize| task.features()[index].place.xyz().is_none();
         let mut free: Vec<usize> = (0..points.len()).filter(|index| is_drawn(*index)).collect();
         for part in task.parts() {
             let Kind::PointToConic(kind) = &part.kind else { continue };
             if kind.conic.iter().all(|index| free.contains(index)) {
-                let [right, down, _] = axes(&in_ball(&mut random));
-                let middle = centre + 0.3 * size * in_ball(&mut random);
+                let [right, down, _] = axes(&in_ball(random));
+                let middle = centre + 0.3 * size * in_ball(random);
                 let n = kind.conic.len() as f64;
                 for (place, &index) in kind.conic.iter().enumerate() {
                     let angle = (place as f64 + random.random_range(-0.3..0.3)) * TAU / n;
@@ -42,7 +76,7 @@ impl Geometry {
                 free.retain(|index| !kind.conic.contains(index));
             }
         }
-        let cameras = cameras(task.cameras().len(), &centre, AWAY * size, &mut random);
+        let cameras = cameras(task.cameras().len(), &centre, AWAY * size, random);
         let mut geometry = Geometry { cameras, points };
         geometry.meet(task, &free, size);
         geometry
