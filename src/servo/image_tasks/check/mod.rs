@@ -48,7 +48,7 @@ pub struct TaskCheck {
     pub error_px: f64,
     /// Other placements that solve it, to which no free motion leads; nearest first.
     pub alternatives: Vec<Alternative>,
-    /// Starts, and how many of them led to a solved placement.
+    /// Starts, half-turns of what was found first among them, and how many of them led to a solved placement.
     pub starts: [usize; 2],
     /// Degrees of freedom that are fixed at solved placements, and at how many of them; where there are several, some placements are
     /// singular.
@@ -91,8 +91,11 @@ struct Family {
     error_px: f64,
 }
 
-/// Iterations from a start; half of them where nothing is near.
+/// Iterations from a start.
 const ITERATIONS: usize = 150;
+
+/// Solved placements whose half-turns are starts too.
+const TURNED: usize = 3;
 
 /// Families that are told apart at most.
 const MOST: usize = 12;
@@ -117,8 +120,14 @@ pub fn check(task: &ImageTask, geometry: &Geometry, settings: &CheckSettings) ->
         )));
     }
     let mut problem = Problem::new(task, geometry);
-    let starts = starts::starts(&problem, settings.starts.max(1), settings.seed);
-    let settled: Vec<Settled> = starts.par_iter().filter_map(|start| problem.settle(start, ITERATIONS)).collect();
+    let mut starts = starts::starts(&problem, settings.starts.max(1), settings.seed);
+    let settle = |start: &Pose| problem.settle(start, ITERATIONS);
+    let mut settled: Vec<Settled> = starts.par_iter().filter_map(settle).collect();
+    let is_solved = |settled: &&Settled| problem.is_solved(settled);
+    let known: Vec<Pose> = settled.iter().filter(is_solved).take(TURNED).map(|settled| settled.pose).collect();
+    let turned: Vec<Pose> = known.iter().flat_map(|pose| starts::half_turns(&problem, pose, settings.seed)).collect();
+    settled.par_extend(turned.par_iter().filter_map(settle));
+    starts.extend(turned);
     let mut solved: Vec<&Settled> = settled.iter().filter(|settled| problem.is_solved(settled)).collect();
     if solved.is_empty() {
         problem.allow_noise(geometry, &settled, settings.within);
