@@ -273,6 +273,26 @@ fn three_points_in_one_image_end_in_every_pose_that_a_closed_form_finds() {
     assert!(several > 5, "{several} others");
 }
 
+// What figure 3.2 of the thesis shows: a marker that seems to be over its cap in both images.
+#[test]
+fn a_line_in_one_plane_with_both_cameras_is_found_to_fix_less() {
+    let on_line = task(TWO, &["a"], &["A", "B"], &["kind = 'point-to-line'; point = 'a'; line = ['A', 'B']"]);
+    for seed in 0..10 {
+        let mut geometry = Geometry::drawn(&on_line, seed);
+        let [a, from, to] = ["a", "A", "B"].map(|name| on_line.feature(name).unwrap());
+        let [left, right] = [0, 1].map(|camera| geometry.cameras[camera].pose.translation);
+        let normal = (left - geometry.points[from]).cross(&(right - geometry.points[from])).normalize();
+        let beside = normal.dot(&(geometry.points[to] - geometry.points[from]));
+        geometry.points[to] -= beside * normal;
+        geometry.points[a] = 0.5 * (geometry.points[from] + geometry.points[to]);
+        let found = check(&on_line, &geometry, &CheckSettings::default()).unwrap();
+        assert_eq!((found.fixed, found.free.motions.len()), (1, 5), "seed {seed}");
+        // The point may leave the line and stay in the plane.
+        let shifts = found.free.motions.iter().filter(|motion| matches!(motion, Motion::Translation { .. }));
+        assert!(shifts.clone().count() == 2 && shifts.clone().all(|m| m.velocity(&normal).dot(&normal).abs() < 1e-4));
+    }
+}
+
 #[test]
 fn with_a_rig_its_cameras_and_features_are_checked() {
     let rig = catalog::rig("ur5").unwrap();

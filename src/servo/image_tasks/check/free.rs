@@ -92,9 +92,12 @@ fn translations(space: &mut Space, free: &mut FreeMotions, names: &Names) {
     }
 }
 
+/// The axis of a rotation about a feature, and its motion.
+type Turn = (Vector3<f64>, Vector6<f64>);
+
 /// Rotations about the feature that most of those left go through; false where none does.
 fn rotations(problem: &Problem, pose: &Pose, space: &mut Space, free: &mut FreeMotions, names: &Names) -> bool {
-    let about = |point: &Vector3<f64>| -> Vec<(Vector3<f64>, Vector6<f64>)> {
+    let about = |point: &Vector3<f64>| -> Vec<Turn> {
         // A rotation about the point moves the hand's middle m by w × (m - point).
         let arm = (pose.translation - point) / problem.size;
         let by = Matrix3::new(0.0, arm.z, -arm.y, -arm.z, 0.0, arm.x, arm.y, -arm.x, 0.0);
@@ -105,7 +108,7 @@ fn rotations(problem: &Problem, pose: &Pose, space: &mut Space, free: &mut FreeM
         };
         space.free_of(&family).iter().map(of).filter(|(_, motion)| space.is_new(motion)).collect()
     };
-    let mut best: Option<(Vector3<f64>, Vec<(Vector3<f64>, Vector6<f64>)>)> = None;
+    let mut best: Option<(Vector3<f64>, Vec<Turn>)> = None;
     for point in names.points() {
         let found = about(&point);
         if !found.is_empty() && best.as_ref().is_none_or(|(_, most)| found.len() > most.len()) {
