@@ -214,6 +214,12 @@ fn every_mistake_in_a_task_file_is_told_with_its_place_and_what_would_do() {
             format!("cameras = ['left']\n{features}@[[tasks]]\nkind = 'point-to-point'\npoint = 'a'\nto = 'a'\n"),
             "`a` is named twice",
         ),
+        (
+            "cameras = ['l', 'r']\nfeatures = [{ name = 'a', on = 'hand' }, { name = 'c', on = 'image', pixels = { l = [1, 2] } }]\n\
+             tasks = [@{ kind = 'point-to-point', point = 'a', to = 'c' }]\n"
+                .to_owned(),
+            "`c` is on the image and has no pixel in that of `r`",
+        ),
         (of("kind = 'point-to-point-3d'\npoint = 'a'\nto = 'b'\npx_per_metre = @0"), "must be above 0"),
         (of("kind = 'line-angle'\nline = ['a', 'b']\nangle_deg = @'up'"), "expected a number"),
     ] {

@@ -20,8 +20,8 @@ const HALVINGS: usize = 12;
 const ATTEMPTS: usize = 6;
 
 impl Geometry {
-    /// Two cameras at about a right angle, or as many as the task has, and features in general position where the task does not say where they
-    /// are: such that the hand at the identity solves it, as far as what is given allows. Points of conics are on circles.
+    /// Two cameras at about a right angle, or as many as the task has, and features in general position where the task does not say
+    /// where they are: such that the hand at the identity solves it, as far as what is given allows. Points of conics are on circles.
     pub fn drawn(task: &ImageTask, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut best: Option<((bool, usize), Geometry)> = None;
@@ -51,7 +51,11 @@ impl Geometry {
             DVector::from_vec(self.errors(task, &Pose { translation: pose.translation + shift, ..pose }))
         };
         let slopes = (0..6).map(|lane| (moved(lane, 1e-5) - moved(lane, -1e-5)) / 2e-5).collect::<Vec<_>>();
-        let values = DMatrix::from_columns(&slopes).singular_values();
+        let slopes = DMatrix::from_columns(&slopes);
+        if !slopes.iter().all(|slope| slope.is_finite()) {
+            return 0;
+        }
+        let values = slopes.singular_values();
         values.iter().filter(|value| **value > 1e-4 * values.max()).count()
     }
 
@@ -106,6 +110,9 @@ impl Geometry {
                 let difference = (at(before + step) - at(before - step)) / (2.0 * step);
                 self.points[index][axis] = before;
                 slopes.set_column(column, &difference);
+            }
+            if !slopes.iter().chain(errors.iter()).all(|value| value.is_finite()) {
+                break;
             }
             let largest = slopes.amax();
             let Ok(motion) = slopes.svd(true, true).solve(&-&errors, 1e-9 * largest) else { break };

@@ -1,5 +1,5 @@
 //! A task: a list of errors that shall all become 0.
-use super::{Feature, Kind, Seen};
+use super::{Feature, Kind, Place, Seen};
 use crate::Error;
 use crate::servo::uncalibrated::Row;
 use handeye_solvers::scalar::{Dual, LANES, derivatives, seed};
@@ -88,6 +88,16 @@ impl ImageTask {
         if part.cameras.is_empty() {
             return Some("no camera sees it".to_owned());
         }
+        let is_nowhere = |feature: usize, camera: usize| match &known[feature].place {
+            Place::Image(pixels) => pixels.get(camera).is_none_or(|pixel| !pixel.iter().all(|x| x.is_finite())),
+            Place::Hand(_) | Place::Target(_) => false,
+        };
+        for &camera in &part.cameras {
+            if let Some(feature) = features.iter().find(|feature| is_nowhere(**feature, camera)) {
+                let (name, camera) = (&known[*feature].name, &cameras[camera]);
+                return Some(format!("`{name}` is on the image and has no pixel in that of `{camera}`"));
+            }
+        }
         let twice = features.iter().enumerate().find(|(i, feature)| features[..*i].contains(feature));
         twice.map(|(_, feature)| format!("`{}` is named twice", known[*feature].name)).or_else(|| part.kind.problem())
     }
@@ -167,7 +177,7 @@ impl ImageTask {
         let mut errors = Vec::new();
         part.kind.errors(&values, &mut errors);
         // Features that are fixed in the image have no noise.
-        let noisy = |place: usize| !matches!(self.features[features[place]].place, super::Place::Image(_));
+        let noisy = |place: usize| !matches!(self.features[features[place]].place, Place::Image(_));
         let scattered: Vec<[usize; 2]> = (0..features.len())
             .filter(|place| noisy(*place))
             .flat_map(|place| (0..coordinates).map(move |coordinate| [place, coordinate]))
