@@ -19,6 +19,7 @@ mod simulate;
 mod suggest;
 mod survey;
 mod table;
+mod task;
 mod trust;
 mod words;
 
@@ -37,6 +38,7 @@ Examples:
   handeye evaluate learned.toml fresh.jsonl                        judge it on other samples
   handeye infer learned.toml fresh.jsonl                           joints and poses from pixels alone
   handeye servo learned.toml ur5-reach                             move features to pixels, in simulation
+  handeye task wrench                                              what a task in images leaves open
 
 Exit status: 0 done; 1 the work could not be done, with the reason; 2 unusable input or arguments.";
 
@@ -65,6 +67,7 @@ enum Command {
     Monitor(monitor::MonitorCommand),
     Suggest(suggest::Suggest),
     Servo(servo::Servo),
+    Task(task::Task),
     Experiment(experiment::ExperimentCommand),
     Export(export::Export),
     Completions(completions::Completions),
@@ -90,6 +93,7 @@ impl Cli {
             Command::Monitor(monitor) => monitor.run(),
             Command::Suggest(suggest) => suggest.run(),
             Command::Servo(servo) => servo.run(self.json),
+            Command::Task(task) => task.run(),
             Command::Experiment(experiment) => experiment.run(),
             Command::Export(export) => export.run(),
             Command::Completions(completions) => completions.run(),

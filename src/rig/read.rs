@@ -2,7 +2,7 @@
 pub(crate) mod document;
 mod estimate;
 mod fit;
-mod named;
+pub(crate) mod named;
 pub(crate) mod noise;
 mod pose;
 mod robot;

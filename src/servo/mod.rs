@@ -9,6 +9,7 @@ mod arm;
 mod controller;
 mod gain;
 mod image_based;
+pub mod image_tasks;
 mod interaction_matrix;
 mod joint_bounds;
 mod known_arm;

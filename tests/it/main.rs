@@ -12,6 +12,8 @@ mod experiments;
 mod export;
 mod factors;
 mod folds;
+mod image_tasks;
+mod image_tasks_checked;
 mod infer;
 mod infer_arms;
 mod infer_rigs;

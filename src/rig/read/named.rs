@@ -4,7 +4,7 @@ use crate::Error;
 use std::collections::BTreeMap;
 
 /// The tables of a list, each with its name; names are checked, and may come only once.
-pub(super) fn read_named<'a>(
+pub(crate) fn read_named<'a>(
     list: Option<&Node<'a>>,
     kind: &str,
     known: &[&str],
