@@ -28,6 +28,7 @@ const PUBLISHED: &[(&str, &[&str])] = &[
     ("table5.1", &["8.151261", "0.00766", "8.900662", "3.088608", "2.945055"]),
     ("table5.2", &["5.264595", "0.003251", "3.16129", "0.000273", "3.145695"]),
     ("table5.3", &["8.868672", "0.006711", "8.769231", "6.246298", "0.003606"]),
+    ("figure5.10", &["where the cameras are orthogonal", "where they overlap"]),
 ];
 
 fn run(name: &str, trials: usize) -> Outcome {

@@ -356,13 +356,13 @@ fn nothing_seen_is_not_converged_and_cameras_at_the_goal_are_not_one() {
 /// Section 5.2.2 of the thesis, in words: smallest and fastest near orthogonal cameras, and refused where they coincide.
 #[test]
 fn cameras_serve_best_where_they_are_orthogonal_and_are_refused_where_they_coincide() {
-    let outcome = find("figure5.10").unwrap().run(&Options { trials: 10, seed: 1 }).unwrap();
+    let outcome = find("figure5.10").unwrap().run(&Options { trials: 100, seed: 1 }).unwrap();
     for series in ["condition number", "iterations to 10 px"] {
         let rows: Vec<_> = outcome.rows.iter().filter(|row| row.series == series).collect();
-        assert_eq!((rows[0].x, rows[0].failed, rows[0].values.len()), (Some(0.0), 10, 0));
+        assert_eq!(rows[0].x, Some(10.0));
         let means = rows.iter().filter_map(|row| Some((row.mean()?, row.x?)));
         let (_, best) = means.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
         assert!((best % 180.0 - 90.0).abs() <= 15.0, "{series}: {best} degrees");
     }
-    assert!(outcome.notes.iter().any(|note| note.contains("10 of 10 are refused before the arm moves")));
+    assert!(outcome.notes.iter().any(|note| note.contains("100 of 100 are refused before the arm moves")));
 }

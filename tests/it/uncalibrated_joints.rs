@@ -4,15 +4,16 @@ use handeye::Error;
 use handeye::infer::Names;
 use handeye::rig::Rig;
 use handeye::servo::limits::TipSpeed;
-use handeye::servo::uncalibrated::Settings;
+use handeye::servo::uncalibrated::{Foresight, Phase, Quantity, Row, Settings, Uncalibrated};
 use handeye::servo::{
-    Command, Controller, Limit, LoopSettings, Measurement, ModelBased, ServoLoop, Stop, Takes, UncalibratedJoints,
+    Command, Controller, Limit, LimitRows, LoopSettings, Measurement, ModelBased, ServoLoop, Stop, Takes,
+    UncalibratedJoints,
 };
 use handeye::simulate::world::{Execution, Fault, FaultKind, Tracker, World, WorldOptions};
 use handeye::simulate::{SimulateOptions, random_rig, simulate};
 use handeye_solvers::Pose;
 use handeye_solvers::manifold::so3;
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -255,4 +256,58 @@ fn what_it_cannot_do_is_said() {
     assert!(
         !with_rig.decide(&now(&seen), &[&TipSpeed { speed: 0.001, strength: 10.0 }], 1.0).unwrap().active.is_empty()
     );
+}
+
+/// A model of two quantities and four rows that says what it is told to.
+struct Told {
+    slopes: Vec<f64>,
+    solution: Option<Vec<f64>>,
+}
+
+impl Foresight for Told {
+    fn predict(&mut self, _: &[f64], errors: &mut Vec<f64>, slopes: &mut Vec<f64>) {
+        (*errors, *slopes) = (vec![0.0; self.slopes.len() / 2], self.slopes.clone());
+    }
+
+    fn solution(&mut self, _: &[f64]) -> Option<Vec<f64>> {
+        self.solution.clone()
+    }
+
+    fn doubts(&mut self, _: &[f64], errors: &[f64]) -> Vec<DMatrix<f64>> {
+        vec![DMatrix::identity(2, 2); errors.len()]
+    }
+}
+
+#[test]
+fn a_model_that_says_nothing_of_use_gives_way_to_exploring_and_one_that_is_wrong_to_what_is_seen() {
+    let slopes = [[300.0, 40.0], [-20.0, 250.0], [100.0, -150.0], [60.0, 80.0]];
+    let told = |slopes: Vec<f64>, solution| Told { slopes, solution };
+    let flat = slopes.concat();
+    let turned: Vec<f64> = slopes.iter().flat_map(|row| [row[0] + 0.6 * row[1], row[1] - 0.6 * row[0]]).collect();
+    let models = [
+        (told(Vec::new(), None), true),
+        (told(vec![f64::NAN; 8], None), true),
+        (told(flat[..6].to_vec(), Some(vec![0.0; 2])), true),
+        (told(flat.clone(), Some(vec![0.0])), false),
+        (told(flat, Some(vec![f64::NAN; 2])), false),
+        (told(turned, Some(vec![7.0, -7.0])), false),
+    ];
+    for (case, (model, explores)) in models.into_iter().enumerate() {
+        let rows = (0..4).map(|row| Row { sd: 0.1, camera: row / 2 }).collect();
+        let quantities = vec![Quantity::default(); 2];
+        let mut servo = Uncalibrated::new(quantities, rows, Settings::with_rig()).unwrap();
+        servo.begin_with_model(Box::new(model));
+        let mut limits = LimitRows::default();
+        limits.clear(2);
+        let mut at = [0.3, -0.2];
+        let mut explored = false;
+        for _ in 0..40 {
+            let errors = slopes.map(|row| row[0] * at[0] + row[1] * at[1]);
+            let command = servo.step(&at, &errors, &limits, 1.0).unwrap();
+            explored |= *command.phase == Phase::Exploring;
+            at.iter_mut().zip(command.motion).for_each(|(at, motion)| *at += motion);
+        }
+        assert!(at.iter().all(|at| at.abs() < 2e-3), "case {case}: {at:?}");
+        assert_eq!(explored, explores, "case {case}");
+    }
 }

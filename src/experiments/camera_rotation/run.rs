@@ -20,7 +20,7 @@ pub struct Run {
 }
 
 /// Iterations of a run.
-const ITERATIONS: usize = 50;
+pub(super) const ITERATIONS: usize = 50;
 
 /// The error below which the thesis counts steps [px].
 const NEAR: f64 = 10.0;

@@ -97,7 +97,7 @@ impl Uncalibrated {
             return Err(Error::Unusable(format!("an estimate of other rows than these {m} with {n} slopes each")));
         }
         (self.estimate, self.explorer, self.phase) = (Some(estimate), None, Phase::Servoing);
-        (self.good, self.losses) = (None, 0);
+        (self.ahead, self.good, self.losses) = (None, None, 0);
         self.unmeasured = (0..m).collect();
         self.dropped.clear();
         self.readings.clear();

@@ -86,7 +86,8 @@ impl Ahead {
         aim: &mut Aim,
     ) -> Option<&Estimate> {
         let away = |there: Vec<f64>| there.iter().zip(at).map(|(there, at)| there - at).collect::<Vec<f64>>();
-        let starts = [self.model.solution(at).map(away), Some(aim.motion.clone())];
+        let solution = self.model.solution(at).filter(|solution| solution.len() == at.len());
+        let starts = [solution.map(away), Some(aim.motion.clone())];
         let mut best: Option<(f64, Vec<f64>)> = None;
         for start in starts.into_iter().flatten() {
             if let Some((cost, motion)) = self.follow(estimate, at, rows, longest, start)
@@ -149,7 +150,9 @@ impl Ahead {
             let [here, there] = [&self.here, &self.there].map(|prediction| prediction.slopes(row, at.len()));
             let learned: f64 =
                 estimate.slopes(row).iter().zip(here).zip(motion).map(|((all, of), d)| (all - of) * d).sum();
-            ahead.shift(row, self.there.errors[row] - self.here.errors[row] + learned);
+            let change =
+                self.there.errors.get(row).zip(self.here.errors.get(row)).map_or(0.0, |(there, here)| there - here);
+            ahead.shift(row, change + learned);
             ahead.carry(row, 1.0, [here, there]);
             // A camera that has moved leads where the others do, until the motions that are left are small.
             ahead.doubt_along(row, motion);
@@ -165,6 +168,6 @@ fn left(errors: &Estimate, variances: &Estimate, rows: &[usize]) -> f64 {
 
 impl Prediction {
     fn slopes(&self, row: usize, n: usize) -> &[f64] {
-        &self.slopes[row * n..(row + 1) * n]
+        self.slopes.get(row * n..(row + 1) * n).unwrap_or_default()
     }
 }
