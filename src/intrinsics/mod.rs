@@ -12,6 +12,7 @@ mod yaml;
 pub use camera_info::to_camera_info;
 pub use kalibr::to_kalibr;
 pub use opencv::to_opencv;
+pub(crate) use parts::model_of;
 
 use crate::Error;
 use crate::camera::CameraModel;

@@ -15,10 +15,14 @@ const MODELS: &[(&str, CameraModel)] = &[
 ];
 
 /// The camera model of a distortion model's name.
+pub(crate) fn model_of(name: &str) -> Option<CameraModel> {
+    MODELS.iter().find(|(known, _)| *known == name).map(|(_, model)| *model)
+}
+
+/// The camera model of a distortion model's name in a file.
 pub(super) fn read_model(document: &Document, node: &Node) -> Result<CameraModel, Error> {
     let found = node.text().unwrap_or_default();
-    let model = MODELS.iter().find(|(name, _)| *name == found).map(|(_, model)| *model);
-    model.ok_or_else(|| {
+    model_of(found).ok_or_else(|| {
         let known = MODELS.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
         document.error(node, format!("unknown distortion model {} (known: {known})", node.description()))
     })

@@ -2,7 +2,7 @@
 use super::names::Names;
 use super::{RecordedCamera, Recording, Sample};
 use crate::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 impl Recording {
     /// Reads several recordings of the same rig and joins them in this order.
@@ -12,14 +12,22 @@ impl Recording {
     ///
     /// Errors: those of [`Recording::read`], and [`Error::Unusable`] where two files do not fit together or none is given.
     pub fn read_all(paths: &[PathBuf]) -> Result<Recording, Error> {
+        Recording::read_all_with(paths, &mut |path| Recording::read(path))
+    }
+
+    /// The same where `read` reads each.
+    pub fn read_all_with(
+        paths: &[PathBuf],
+        read: &mut impl FnMut(&Path) -> Result<Recording, Error>,
+    ) -> Result<Recording, Error> {
         let [first, others @ ..] = paths else {
             return Err(Error::Unusable("no recording is given".to_owned()));
         };
-        let mut joined = Recording::read(first)?;
+        let mut joined = read(first)?;
         // The file from which each camera is known.
         let mut sources = vec![first; joined.cameras.len()];
         for path in others {
-            let next = Recording::read(path)?;
+            let next = read(path)?;
             if next.joints != joined.joints {
                 return Err(Error::Unusable(format!(
                     "{} and {} are of different robots: joints {:?} and {:?}",

@@ -1,0 +1,139 @@
+//! The kinds of messages that a recording is made of, and what is taken from each.
+use super::value::Value;
+use crate::geometry::orientation;
+use handeye_solvers::Pose;
+use nalgebra::Vector3;
+
+/// What a topic carries, by its type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    JointStates,
+    CameraInfo,
+    /// AprilTags, of apriltag_msgs or apriltag_detector_msgs.
+    Tags,
+    /// vision_msgs/Detection2DArray.
+    Detections,
+    Pose,
+    Transforms,
+}
+
+impl Kind {
+    /// The kind of a message type, `sensor_msgs/msg/JointState` or `sensor_msgs/JointState`.
+    pub(super) fn of(type_name: &str) -> Option<Kind> {
+        let package = type_name.split('/').next().unwrap_or_default();
+        match (package, type_name.rsplit('/').next().unwrap_or_default()) {
+            ("sensor_msgs", "JointState") => Some(Kind::JointStates),
+            ("sensor_msgs", "CameraInfo") => Some(Kind::CameraInfo),
+            ("apriltag_msgs" | "apriltag_detector_msgs", "AprilTagDetectionArray") => Some(Kind::Tags),
+            ("vision_msgs", "Detection2DArray") => Some(Kind::Detections),
+            ("geometry_msgs", "PoseStamped") => Some(Kind::Pose),
+            ("tf2_msgs", "TFMessage") => Some(Kind::Transforms),
+            _ => None,
+        }
+    }
+
+    pub(super) fn is_of_images(self) -> bool {
+        matches!(self, Kind::Tags | Kind::Detections)
+    }
+
+    /// Fields to decode.
+    pub(super) fn wanted(self) -> &'static [&'static str] {
+        match self {
+            Kind::JointStates => &["header.stamp", "name", "position"],
+            Kind::CameraInfo => &[
+                "header.frame_id",
+                "width",
+                "height",
+                "distortion_model",
+                "d",
+                "k",
+                "D",
+                "K",
+                "binning_x",
+                "binning_y",
+                "roi",
+            ],
+            Kind::Tags => &["header", "detections.family", "detections.id", "detections.corners"],
+            Kind::Detections => &["header", "detections.id", "detections.results", "detections.bbox.center"],
+            Kind::Pose => &["header.stamp", "pose"],
+            Kind::Transforms => &["transforms"],
+        }
+    }
+}
+
+/// A field that a message has to have.
+pub(super) fn need<T>(field: Option<T>, name: &str) -> Result<T, String> {
+    field.ok_or_else(|| format!("has no field `{name}` of the usual type"))
+}
+
+/// The stamp of a header [ns].
+pub(super) fn stamp(message: &Value) -> Result<i64, String> {
+    let part = |name: &str| need(message.number(&format!("header.stamp.{name}")), &format!("header.stamp.{name}"));
+    Ok(part("sec")? as i64 * 1_000_000_000 + part("nanosec")? as i64)
+}
+
+/// The frame of a header; a leading `/` is of ROS 1.
+pub(super) fn frame<'a>(message: &Value<'a>) -> &'a str {
+    message.text("header.frame_id").unwrap_or_default().trim_start_matches('/')
+}
+
+/// What an image shows: names and pixels.
+pub(super) fn features(kind: Kind, message: &Value) -> Result<Vec<(String, [f64; 2])>, String> {
+    let mut features = Vec::new();
+    let Some(detections) = message.list("detections") else {
+        return Err("has no field `detections` of the usual type".to_owned());
+    };
+    for detection in detections {
+        match kind {
+            Kind::Tags => {
+                let family = detection.text("family").unwrap_or("tag");
+                let id = need(detection.number("id"), "detections.id")?;
+                for (corner, pixel) in corners(detection)?.into_iter().enumerate() {
+                    features.push((format!("{family}:{id}/{corner}"), pixel));
+                }
+            }
+            _ => {
+                let pixel = |axis: &str| {
+                    let field = detection.number(&format!("bbox.center.position.{axis}"));
+                    need(field.or_else(|| detection.number(&format!("bbox.center.{axis}"))), "detections.bbox.center")
+                };
+                features.push((need(name(detection), "detections.id")?.to_owned(), [pixel("x")?, pixel("y")?]));
+            }
+        }
+    }
+    Ok(features)
+}
+
+/// The four corners, `float64[8]` or `Point[4]`.
+fn corners(detection: &Value) -> Result<Vec<[f64; 2]>, String> {
+    let field = "detections.corners";
+    if let Some(numbers) = detection.numbers("corners") {
+        return Ok(numbers.as_chunks().0.to_vec());
+    }
+    let points = need(detection.list("corners"), field)?;
+    let corner = |point: &Value| Ok([need(point.number("x"), field)?, need(point.number("y"), field)?]);
+    points.iter().map(corner).collect()
+}
+
+/// The identity of a detection, or what it is most probably of.
+fn name<'a>(detection: &Value<'a>) -> Option<&'a str> {
+    let id = detection.text("id").filter(|id| !id.is_empty());
+    id.or_else(|| {
+        let first = detection.list("results")?.first()?;
+        first.text("hypothesis.class_id").or_else(|| first.text("id"))
+    })
+}
+
+/// A pose of two parts by their names: its origin, and the quaternion that it is turned by.
+pub(super) fn pose(message: &Value, origin: &str, turn: &str) -> Result<Pose, String> {
+    let part = |of: &str, axis: &str| need(message.number(&format!("{of}.{axis}")), of);
+    let translation = Vector3::new(part(origin, "x")?, part(origin, "y")?, part(origin, "z")?);
+    let quaternion = ["x", "y", "z", "w"].map(|axis| part(turn, axis));
+    let [x, y, z, w] = quaternion;
+    let rotation = orientation::from_quaternion([x?, y?, z?, w?])
+        .ok_or_else(|| format!("`{turn}` is no rotation, a quaternion of length 0 or without numbers"))?;
+    if !translation.iter().all(|number| number.is_finite()) {
+        return Err(format!("`{origin}` has what is no number"));
+    }
+    Ok(Pose { rotation, translation })
+}

@@ -1,0 +1,168 @@
+//! Bags of ROS 2 in MCAP files as recordings.
+//!
+//! A bag is read twice, in the memory that one chunk and the samples take: images first, which are the samples, and then where the
+//! robot was at their stamps. Messages are decoded by the schemas that the file carries.
+mod cameras;
+mod frames;
+mod images;
+mod kinds;
+mod messages;
+mod samples;
+mod schema;
+mod states;
+mod topics;
+mod track;
+mod value;
+
+use super::{Detection, Recording, Sample};
+use crate::Error;
+use handeye_solvers::Pose;
+use images::{Images, tidy};
+use kinds::Kind;
+use samples::Group;
+use states::States;
+use std::path::Path;
+use topics::choose;
+use track::At;
+
+/// What of a bag is meant, where its types alone do not tell.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BagOptions {
+    /// The topic of joint states; not needed where there is only one.
+    pub joint_topic: Option<String>,
+    /// Names of the joints from base to tip, some of those in the bag; empty: `known_joints`, or those of the first joint state.
+    pub joints: Vec<String>,
+    /// Names that the joints have where the bag has all of them, as those of a rig.
+    pub known_joints: Vec<String>,
+    /// The topic of tip poses (PoseStamped). Where none is named and there are no joint states, the only one is taken.
+    pub pose_topic: Option<String>,
+    /// The frames of the base and the tip, for tip poses from TF.
+    pub frames: Option<[String; 2]>,
+    /// Topics of detections, with the name of the camera where it is not that of the frame; empty: all.
+    pub camera_topics: Vec<(String, Option<String>)>,
+    /// Images of several cameras at most this far apart make one sample [s]; `None`: half the time between two images.
+    pub join: Option<f64>,
+}
+
+/// A bag as a recording, and what has to be said of it.
+#[derive(Clone, Debug)]
+pub struct Bag {
+    /// One sample for each time at which images show features, in their order; times are stamps [s].
+    pub recording: Recording,
+    /// What was left out, where the file ends early, and how far apart the states are that were interpolated: one line each.
+    pub notes: Vec<String>,
+}
+
+impl Bag {
+    /// Reads an MCAP file.
+    ///
+    /// Features: the corners of AprilTags `FAMILY:ID/CORNER`, the centres of Detection2D by their id. Joint states are
+    /// interpolated to the images' stamps, tip poses too (slerp). A file that is cut off or damaged is read as far as it goes.
+    ///
+    /// Errors: [`Error::Io`], and [`Error::Unusable`] with file and topic for messages that do not fit their schema, topics that are
+    /// missing or more than one, and a file without images.
+    pub fn read(path: &Path, options: &BagOptions) -> Result<Bag, Error> {
+        let mut images = Images::new(path, options);
+        let problem = messages::visit(path, &mut images)?;
+        let mut notes: Vec<String> = problem.into_iter().collect();
+        let (cameras, camera_of_source) = cameras::cameras(&images.sources, &images.infos, &images.topics, options);
+        let within = options.join.map(|seconds| (seconds * 1e9) as i64);
+        let groups = samples::groups(&images.images, &camera_of_source, within);
+        if groups.is_empty() {
+            let cut_off = notes.first().map_or_else(String::new, |note| format!(", and it {note}"));
+            return Err(Error::Unusable(format!(
+                "{}: has no image with features (apriltag_msgs/AprilTagDetectionArray or vision_msgs/Detection2DArray{}); it has {}{cut_off}",
+                path.display(),
+                if options.camera_topics.is_empty() { "" } else { ", on the topics that were named" },
+                topics::list(&images.topics)
+            )));
+        }
+        let topics = &images.topics;
+        let joint_topic = choose(topics, Kind::JointStates, options.joint_topic.as_deref(), "--joint-topic", path)?;
+        let pose_topic = match &options.pose_topic {
+            None if joint_topic.is_some() || options.frames.is_some() => None,
+            named => choose(topics, Kind::Pose, named.as_deref(), "--pose-topic", path)?,
+        };
+        let moments: Vec<i64> = groups.iter().map(|group| group.time).collect();
+        let mut states = States::new(path, options, &moments, [joint_topic, pose_topic]);
+        if joint_topic.is_some() || pose_topic.is_some() || options.frames.is_some() {
+            messages::visit(path, &mut states)?;
+        }
+        let poses = match &options.frames {
+            Some([base, tip]) => states
+                .frames
+                .poses(&moments, base.trim_start_matches('/'), tip.trim_start_matches('/'))
+                .map_err(|problem| Error::Unusable(format!("{}: {problem}", path.display())))?,
+            None => states.poses.at(&moments),
+        };
+        let joints = states.joints.at(&moments);
+        notes.extend(note_on_groups(&groups));
+        if joint_topic.is_some() {
+            notes.extend(note_on_states("joint states", &joints, states.joints.span(), &moments));
+        }
+        if pose_topic.is_some() || options.frames.is_some() {
+            notes.extend(note_on_states("tip poses", &poses, states.poses.span(), &moments));
+        }
+        for (number, what) in [
+            (states.skipped, "joint states lack a joint or a position, and are left out"),
+            (images.not_finite, "detections are no numbers, and are left out"),
+        ] {
+            if number > 0 {
+                notes.push(format!("{number} {what}"));
+            }
+        }
+        let samples = groups.iter().zip(joints).zip(poses);
+        let sample = |((group, joints), poses): ((&Group, Option<At<Vec<f64>>>), Option<At<Pose>>)| Sample {
+            time: Some(group.time as f64 / 1e9),
+            joints: joints.map(|at| at.value),
+            pose: poses.map(|at| at.value),
+            pixels: group
+                .images
+                .iter()
+                .flat_map(|&index| {
+                    let image = &images.images[index];
+                    let camera = camera_of_source[image.source];
+                    image.features.iter().map(move |&(feature, pixel)| Detection { camera, feature, pixel })
+                })
+                .collect(),
+            ..Sample::default()
+        };
+        let mut samples: Vec<Sample> = samples.map(sample).collect();
+        let (features, places) = images.features.in_natural_order();
+        let mut twice = 0;
+        for sample in &mut samples {
+            let before = sample.pixels.len();
+            sample.pixels.sort_by_key(|detection| (detection.camera, detection.feature));
+            sample.pixels.dedup_by_key(|detection| (detection.camera, detection.feature));
+            twice += before - sample.pixels.len();
+            sample.renumber(&places);
+        }
+        if twice > 0 {
+            notes
+                .push(format!("{twice} detections are of a feature that the same image has already, and are left out"));
+        }
+        let joints = states.names.iter().map(|name| tidy(name)).collect();
+        Ok(Bag { recording: Recording { joints, cameras, features, samples }, notes })
+    }
+}
+
+fn note_on_groups(groups: &[Group]) -> Option<String> {
+    let spread = groups.iter().map(|group| group.spread).max().filter(|spread| *spread > 0)?;
+    Some(format!("images that make one sample are up to {:.6} s apart", spread as f64 / 1e9))
+}
+
+fn note_on_states<T>(what: &str, found: &[Option<At<T>>], span: Option<[i64; 2]>, moments: &[i64]) -> Vec<String> {
+    let mut notes = Vec::new();
+    let largest = found.iter().flatten().map(|at| at.gap).max().unwrap_or(0);
+    if largest > 0 {
+        notes.push(format!("{what} are interpolated, between two that are up to {:.6} s apart", largest as f64 / 1e9));
+    }
+    let missing = found.iter().filter(|at| at.is_none()).count();
+    if missing > 0 {
+        let within = span.map_or_else(String::new, |[first, last]| {
+            format!(", which go from {:.6} s to {:.6} s", first as f64 / 1e9, last as f64 / 1e9)
+        });
+        notes.push(format!("{missing} of {} samples are outside the {what}{within}, and have none", moments.len()));
+    }
+    notes
+}

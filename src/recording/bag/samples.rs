@@ -1,0 +1,58 @@
+//! Images of several cameras at the same time as one sample.
+use super::images::Image;
+
+/// Images that make a sample.
+pub(super) struct Group {
+    /// The mean of their stamps [ns].
+    pub time: i64,
+    /// Indices, ordered by stamp.
+    pub images: Vec<usize>,
+    /// How far the first and the last are apart [ns].
+    pub spread: i64,
+}
+
+/// Groups images whose stamps are `within` [ns] of the first of them, each of another camera or of exactly its stamp.
+///
+/// `within`: half the shortest usual time between two images of one camera where it is not given.
+pub(super) fn groups(images: &[Image], camera: &[u32], within: Option<i64>) -> Vec<Group> {
+    let mut order: Vec<usize> = (0..images.len()).filter(|&index| !images[index].features.is_empty()).collect();
+    order.sort_by_key(|&index| images[index].stamp);
+    let within = within.unwrap_or_else(|| usual_period(images, camera, &order) / 2);
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for index in order {
+        let image = &images[index];
+        let fits = |group: &&mut Vec<usize>| {
+            let is_same = |&other: &usize| {
+                camera[images[other].source] == camera[image.source] && images[other].stamp != image.stamp
+            };
+            image.stamp.saturating_sub(images[group[0]].stamp) <= within && !group.iter().any(is_same)
+        };
+        match groups.last_mut().filter(fits) {
+            Some(group) => group.push(index),
+            None => groups.push(vec![index]),
+        }
+    }
+    let group = |group: Vec<usize>| {
+        let first = images[group[0]].stamp;
+        let later = |index: &usize| images[*index].stamp.saturating_sub(first);
+        let sum: i128 = group.iter().map(|index| i128::from(later(index))).sum();
+        let mean = (sum / group.len() as i128) as i64;
+        let spread = group.iter().map(later).max().unwrap_or(0);
+        Group { time: first.saturating_add(mean), spread, images: group }
+    };
+    groups.into_iter().map(group).collect()
+}
+
+/// The smallest median of the times between two images of one camera [ns]; 0 where none has two.
+fn usual_period(images: &[Image], camera: &[u32], order: &[usize]) -> i64 {
+    let n_cameras = camera.iter().max().map_or(0, |last| last + 1);
+    let period = |of: u32| {
+        let of_it = order.iter().map(|&index| &images[index]).filter(|image| camera[image.source] == of);
+        let stamps: Vec<i64> = of_it.map(|image| image.stamp).collect();
+        let mut periods: Vec<i64> = stamps.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).collect();
+        periods.retain(|period| *period > 0);
+        periods.sort_unstable();
+        periods.get(periods.len().checked_sub(1)? / 2).copied()
+    };
+    (0..n_cameras).filter_map(period).min().unwrap_or(0)
+}

@@ -1,0 +1,89 @@
+//! What changes with time, between the moments at which it was measured.
+use handeye_solvers::Pose;
+use handeye_solvers::manifold::so3;
+
+/// What can be interpolated.
+pub(super) trait Between {
+    /// `weight`: 0 at `self`, 1 at `other`.
+    fn between(&self, other: &Self, weight: f64) -> Self;
+}
+
+impl Between for Vec<f64> {
+    fn between(&self, other: &Self, weight: f64) -> Self {
+        self.iter().zip(other).map(|(a, b)| a + weight * (b - a)).collect()
+    }
+}
+
+impl Between for Pose {
+    /// The origin on a line, the rotation about one axis at one speed (slerp).
+    fn between(&self, other: &Self, weight: f64) -> Self {
+        let turn = so3::log(&(self.rotation.transpose() * other.rotation));
+        Pose {
+            rotation: self.rotation * so3::exp(&(turn * weight)),
+            translation: self.translation + (other.translation - self.translation) * weight,
+        }
+    }
+}
+
+/// Of all that was measured, what stands next to one of the moments that are asked for: memory goes with these alone.
+///
+/// Moment i and its predecessor enclose gap i, which ends with moment i itself; the first and the last measurement in each are kept.
+#[derive(Debug)]
+pub(super) struct Track<T> {
+    gaps: Vec<Option<[(i64, T); 2]>>,
+    span: Option<[i64; 2]>,
+}
+
+/// A value at a moment, and how far apart the two are that it lies between [ns].
+#[derive(Debug)]
+pub(super) struct At<T> {
+    pub value: T,
+    pub gap: i64,
+}
+
+impl<T: Clone + Between> Track<T> {
+    /// For a number of moments.
+    pub(super) fn new(moments: usize) -> Self {
+        Track { gaps: vec![None; moments + 1], span: None }
+    }
+
+    /// Takes a measurement, in any order; `moments` [ns] are sorted. Of two at the same time the first counts.
+    pub(super) fn add(&mut self, moments: &[i64], time: i64, value: T) {
+        let [first, last] = self.span.unwrap_or([time; 2]);
+        self.span = Some([first.min(time), last.max(time)]);
+        let gap = &mut self.gaps[moments.partition_point(|moment| *moment < time)];
+        match gap {
+            None => *gap = Some([(time, value.clone()), (time, value)]),
+            Some([first, _]) if time < first.0 => *first = (time, value),
+            Some([_, last]) if time > last.0 => *last = (time, value),
+            Some(_) => {}
+        }
+    }
+
+    /// First and last time of a measurement [ns].
+    pub(super) fn span(&self) -> Option<[i64; 2]> {
+        self.span
+    }
+
+    /// The values at all moments; `None` before the first measurement and after the last.
+    pub(super) fn at(&self, moments: &[i64]) -> Vec<Option<At<T>>> {
+        // The next measurement after each gap.
+        let mut next: Vec<Option<&(i64, T)>> = vec![None; moments.len() + 1];
+        for index in (0..moments.len()).rev() {
+            next[index] = self.gaps[index + 1].as_ref().map(|[first, _]| first).or(next[index + 1]);
+        }
+        let mut before: Option<&(i64, T)> = None;
+        let at = |(index, moment): (usize, &i64)| {
+            before = self.gaps[index].as_ref().map(|[_, last]| last).or(before);
+            let (start, from) = before?;
+            if start == moment {
+                return Some(At { value: from.clone(), gap: 0 });
+            }
+            let (end, to) = next[index]?;
+            let gap = end.saturating_sub(*start);
+            let weight = moment.saturating_sub(*start) as f64 / gap as f64;
+            Some(At { value: from.between(to, weight), gap })
+        };
+        moments.iter().enumerate().map(at).collect()
+    }
+}
