@@ -80,9 +80,7 @@ impl Frames {
         let mut poses: Vec<Option<At<Pose>>> = moments.iter().map(|_| identity()).collect();
         for (_, edge) in way.iter().filter_map(|name| self.tracks.get(*name)) {
             let edges = match edge {
-                Edge::Static(pose) => {
-                    moments.iter().map(|_| Some(At { value: pose.clone(), gap: 0 })).collect::<Vec<_>>()
-                }
+                Edge::Static(pose) => moments.iter().map(|_| Some(At { value: *pose, gap: 0 })).collect::<Vec<_>>(),
                 Edge::Moving(track) => track.at(moments),
             };
             for (pose, edge) in poses.iter_mut().zip(edges) {

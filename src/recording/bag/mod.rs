@@ -111,11 +111,14 @@ impl Bag {
                 notes.push(format!("{number} {what}"));
             }
         }
-        let samples = groups.iter().zip(joints).zip(poses);
-        let sample = |((group, joints), poses): ((&Group, Option<At<Vec<f64>>>), Option<At<Pose>>)| Sample {
+        let names = std::mem::take(&mut states.names);
+        let states =
+            joints.into_iter().zip(poses).map(|(joints, pose)| (joints.map(|at| at.value), pose.map(|at| at.value)));
+        let samples = groups.iter().zip(states).map(|(group, (joints, pose))| (group, joints, pose));
+        let sample = |(group, joints, pose): (&Group, Option<Vec<f64>>, Option<Pose>)| Sample {
             time: Some(group.time as f64 / 1e9),
-            joints: joints.map(|at| at.value),
-            pose: poses.map(|at| at.value),
+            joints,
+            pose,
             pixels: group
                 .images
                 .iter()
@@ -141,7 +144,7 @@ impl Bag {
             notes
                 .push(format!("{twice} detections are of a feature that the same image has already, and are left out"));
         }
-        let joints = states.names.iter().map(|name| tidy(name)).collect();
+        let joints = names.iter().map(|name| tidy(name)).collect();
         Ok(Bag { recording: Recording { joints, cameras, features, samples }, notes })
     }
 }
