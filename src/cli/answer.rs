@@ -69,6 +69,11 @@ fn write(text: &str) -> ExitCode {
     }
 }
 
+/// Tells on standard error what has to be known beside the answer.
+pub fn remark(what: &str) {
+    let _ = writeln!(io::stderr(), "note: {what}");
+}
+
 fn complain(reason: &str) {
     // As above.
     let _ = writeln!(io::stderr(), "error: {reason}");

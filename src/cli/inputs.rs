@@ -1,6 +1,7 @@
 //! Reading a rig and the recordings that go with it, and seeing in time that an output can be written.
+use super::answer::remark;
 use handeye::Error;
-use handeye::recording::{Recording, Sample};
+use handeye::recording::{Bag, BagOptions, Recording, Sample};
 use handeye::rig::{Rig, catalog, matches};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -26,14 +27,24 @@ pub fn read_rig(argument: &Path) -> Result<RigInput, Error> {
     Ok(RigInput { rig, text, name })
 }
 
-/// Reads recordings as one, and refuses what the rig cannot be the rig of.
+/// Reads recordings as one, ROS 2 bags (.mcap) with default options, and refuses what the rig cannot be the rig of.
 pub fn read_recordings(paths: &[PathBuf], rig: Option<&RigInput>) -> Result<Recording, Error> {
     read_recordings_with_new(paths, rig, &[])
 }
 
 /// The same where parameters that match any of `new` may be of cameras that the rig does not have yet.
 pub fn read_recordings_with_new(paths: &[PathBuf], rig: Option<&RigInput>, new: &[String]) -> Result<Recording, Error> {
-    let recording = Recording::read_all(paths)?;
+    let known_joints: Vec<String> =
+        rig.map_or_else(Vec::new, |input| input.rig.robot.joints.iter().map(|joint| joint.name.clone()).collect());
+    let options = BagOptions { known_joints, ..BagOptions::default() };
+    let recording = Recording::read_all_with(paths, &mut |path| {
+        if path.extension().is_none_or(|extension| extension != "mcap") {
+            return Recording::read(path);
+        }
+        let Bag { recording, notes } = Bag::read(path, &options)?;
+        notes.iter().for_each(|note| remark(&format!("{}: {note}", path.display())));
+        Ok(recording)
+    })?;
     if let Some(problem) = rig.and_then(|rig| mismatch(rig, &recording, new)) {
         let file = paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
         return Err(Error::Malformed { file, line: 1, column: 1, problem });

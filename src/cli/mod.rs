@@ -3,6 +3,7 @@ mod answer;
 mod calibrate;
 mod check;
 mod completions;
+mod convert;
 mod counts;
 mod demo;
 mod evaluate;
@@ -45,7 +46,7 @@ Exit status: 0 done; 1 the work could not be done, with the reason; 2 unusable i
 /// Learns one model of a robot arm, its cameras and the features they track from a recording
 ///
 /// The model predicts every pixel from the joints. Nothing needs to be known beforehand; what is known is used. Rigs are
-/// TOML files, recordings JSON Lines; metres, radians, seconds, pixels.
+/// TOML files, recordings JSON Lines or ROS 2 bags (MCAP); metres, radians, seconds, pixels.
 #[derive(Parser)]
 #[command(name = "handeye", version, after_help = EXAMPLES, arg_required_else_help = true, max_term_width = 120)]
 pub struct Cli {
@@ -69,6 +70,7 @@ enum Command {
     Servo(servo::Servo),
     Task(task::Task),
     Experiment(experiment::ExperimentCommand),
+    Convert(convert::Convert),
     Export(export::Export),
     Completions(completions::Completions),
 }
@@ -95,6 +97,7 @@ impl Cli {
             Command::Servo(servo) => servo.run(self.json),
             Command::Task(task) => task.run(),
             Command::Experiment(experiment) => experiment.run(),
+            Command::Convert(convert) => convert.run(),
             Command::Export(export) => export.run(),
             Command::Completions(completions) => completions.run(),
         }

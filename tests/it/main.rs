@@ -1,4 +1,5 @@
 //! What users are promised, one file per promise.
+mod bag;
 mod calibration;
 mod cli;
 mod cli_calibrate;

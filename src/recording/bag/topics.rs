@@ -91,7 +91,10 @@ pub(super) fn choose<'a>(
         None => match names.as_slice() {
             [] => Ok(None),
             [name] => Ok(Some(name)),
-            _ => Err(Error::Unusable(format!("{file}: {option} has to name one of {}", names.join(", ")))),
+            _ => Err(Error::Unusable(format!(
+                "{file}: {option} of `handeye convert` has to name one of {}",
+                names.join(", ")
+            ))),
         },
     }
 }

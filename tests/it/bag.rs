@@ -1,0 +1,282 @@
+//! Bags of ROS 2: read as the recordings that they came from.
+use crate::cli::Folder;
+use handeye::recording::{Bag, BagOptions, Recording};
+use handeye::rig::catalog;
+use handeye::simulate::{SimulateOptions, simulate};
+use mcap::records::MessageHeader;
+use mcap::{Compression, WriteOptions};
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::path::Path;
+
+const HEADER: &str = "std_msgs/Header header\n";
+const HEADER_PARTS: &str = "================================================================================\n\
+    MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n\
+    ================================================================================\n\
+    MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n";
+const JOINTS: &str = "string[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n";
+const INFO: &str = "uint32 height\nuint32 width\nstring distortion_model\nfloat64[] d\nfloat64[9] k\nfloat64[9] r\nfloat64[12] p\n\
+    uint32 binning_x\nuint32 binning_y\nsensor_msgs/RegionOfInterest roi\n";
+const INFO_PARTS: &str = "================================================================================\n\
+    MSG: sensor_msgs/RegionOfInterest\nuint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify\n";
+const TAGS: &str = "apriltag_msgs/AprilTagDetection[] detections\n";
+const TAGS_PARTS: &str = "================================================================================\n\
+    MSG: apriltag_msgs/AprilTagDetection\nstring family\nint32 id\nint32 hamming\nfloat32 goodness\nfloat32 decision_margin\n\
+    apriltag_msgs/Point centre\napriltag_msgs/Point[4] corners\nfloat64[9] homography\n\
+    ================================================================================\n\
+    MSG: apriltag_msgs/Point\nfloat64 x\nfloat64 y\n";
+
+/// Numbers and texts in CDR, little-endian.
+struct Cdr(Vec<u8>);
+
+impl Cdr {
+    fn new() -> Cdr {
+        Cdr(vec![0, 1, 0, 0])
+    }
+
+    fn put(&mut self, bytes: &[u8]) {
+        while !(self.0.len() - 4).is_multiple_of(bytes.len()) {
+            self.0.push(0);
+        }
+        self.0.extend_from_slice(bytes);
+    }
+
+    fn int(&mut self, number: u32) {
+        self.put(&number.to_le_bytes());
+    }
+
+    fn float(&mut self, number: f64) {
+        self.put(&number.to_le_bytes());
+    }
+
+    fn text(&mut self, text: &str) {
+        self.int(text.len() as u32 + 1);
+        self.0.extend_from_slice(text.as_bytes());
+        self.0.push(0);
+    }
+
+    fn floats(&mut self, numbers: &[f64]) {
+        self.int(numbers.len() as u32);
+        numbers.iter().for_each(|number| self.float(*number));
+    }
+
+    fn header(stamp: u64, frame: &str) -> Cdr {
+        let mut cdr = Cdr::new();
+        cdr.int((stamp / 1_000_000_000) as u32);
+        cdr.int((stamp % 1_000_000_000) as u32);
+        cdr.text(frame);
+        cdr
+    }
+}
+
+fn joint_state(stamp: u64, names: &[String], positions: &[f64]) -> Vec<u8> {
+    let mut cdr = Cdr::header(stamp, "");
+    cdr.int(names.len() as u32);
+    names.iter().for_each(|name| cdr.text(name));
+    cdr.floats(positions);
+    cdr.floats(&[]);
+    cdr.floats(&[]);
+    cdr.0
+}
+
+/// When each sample is, the states before and after it, and the order of the joints in a state [ns].
+const EVERY: u64 = 100_000_000;
+
+/// The recording as a bag: joints at the stamps of images, tags of one feature per corner.
+fn bag(recording: &Recording, options: WriteOptions, shuffled: bool) -> Vec<u8> {
+    let mut writer = options.create(Cursor::new(Vec::new())).unwrap();
+    let mut channel = |topic: &str, kind: &str, text: String| {
+        let schema = writer.add_schema(kind, "ros2msg", text.as_bytes()).unwrap();
+        writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).unwrap()
+    };
+    let joints = channel("/joint_states", "sensor_msgs/msg/JointState", format!("{HEADER}{JOINTS}{HEADER_PARTS}"));
+    let cameras: Vec<(u16, u16)> = recording
+        .cameras
+        .iter()
+        .map(|camera| {
+            let info = format!("{HEADER}{INFO}{HEADER_PARTS}{INFO_PARTS}");
+            let tags = format!("{HEADER}{TAGS}{HEADER_PARTS}{TAGS_PARTS}");
+            let name = &camera.name;
+            (
+                channel(&format!("/{name}/camera_info"), "sensor_msgs/msg/CameraInfo", info),
+                channel(&format!("/{name}/tags"), "apriltag_msgs/msg/AprilTagDetectionArray", tags),
+            )
+        })
+        .collect();
+    let mut write = |channel_id: u16, time: u64, data: &[u8]| {
+        let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
+        writer.write_to_known_channel(&header, data).unwrap();
+    };
+    for (camera, (info, _)) in recording.cameras.iter().zip(&cameras) {
+        let [width, height] = camera.size.unwrap();
+        let mut cdr = Cdr::header(0, &camera.name);
+        cdr.int(height);
+        cdr.int(width);
+        cdr.text("plumb_bob");
+        cdr.floats(&[0.0; 5]);
+        let k = [camera.fx, camera.cx, camera.fy, camera.cy].map(Option::unwrap);
+        [k[0], 0.0, k[1], 0.0, k[2], k[3], 0.0, 0.0, 1.0].iter().for_each(|number| cdr.float(*number));
+        (0..21).for_each(|_| cdr.float(0.0));
+        (0..6).for_each(|_| cdr.int(0));
+        cdr.0.push(0);
+        write(*info, 1, &cdr.0);
+    }
+    let mut order: Vec<usize> = (0..recording.joints.len()).collect();
+    if shuffled {
+        order.reverse();
+    }
+    let names: Vec<String> = order.iter().map(|joint| recording.joints[*joint].clone()).collect();
+    for (index, sample) in recording.samples.iter().enumerate() {
+        let stamp = 1_000_000_000 + EVERY * index as u64;
+        let read = sample.joints.as_ref().unwrap();
+        let positions: Vec<f64> = order.iter().map(|joint| read[*joint]).collect();
+        write(joints, stamp, &joint_state(stamp, &names, &positions));
+        for (camera, (_, tags)) in cameras.iter().enumerate() {
+            let seen: Vec<_> = sample.pixels.iter().filter(|seen| seen.camera as usize == camera).collect();
+            let tags_seen: Vec<u32> = (0..recording.features.len() as u32 / 4)
+                .filter(|tag| (0..4).all(|corner| seen.iter().any(|seen| seen.feature == 4 * tag + corner)))
+                .collect();
+            let mut cdr = Cdr::header(stamp, &recording.cameras[camera].name);
+            cdr.int(tags_seen.len() as u32);
+            for tag in tags_seen {
+                cdr.text("tag36h11");
+                cdr.int(tag);
+                cdr.int(0);
+                cdr.int(0);
+                cdr.int(0);
+                (0..2).for_each(|_| cdr.float(0.0));
+                for corner in 0..4 {
+                    let seen = seen.iter().find(|seen| seen.feature == 4 * tag + corner).unwrap();
+                    seen.pixel.iter().for_each(|number| cdr.float(*number));
+                }
+                (0..9).for_each(|_| cdr.float(0.0));
+            }
+            write(*tags, stamp, &cdr.0);
+        }
+    }
+    writer.finish().unwrap();
+    writer.into_inner().into_inner()
+}
+
+/// A recording of whole tags, as a bag can hold it.
+fn recorded() -> Recording {
+    let rig = catalog::rig("ur5").unwrap();
+    let options = SimulateOptions { samples: 40, in_view: 1.0, seed: 3, ..SimulateOptions::default() };
+    let mut recording = simulate(&rig, &options).unwrap().recording;
+    recording.features = (0..12).map(|k| format!("tag36h11:{}/{}", k / 4, k % 4)).collect();
+    for (index, sample) in recording.samples.iter_mut().enumerate() {
+        sample.time = Some(1.0 + 0.1 * index as f64);
+        (sample.joint_action, sample.pose_action, sample.pose) = (None, None, None);
+    }
+    recording
+}
+
+fn read(bytes: &[u8], folder: &Folder) -> Result<Bag, handeye::Error> {
+    std::fs::write(folder.path().join("bag.mcap"), bytes).unwrap();
+    Bag::read(&folder.path().join("bag.mcap"), &BagOptions::default())
+}
+
+#[test]
+fn a_bag_of_every_layout_is_the_recording_that_it_came_from() {
+    let folder = Folder::new("bag-layouts");
+    let recording = recorded();
+    let layouts = [
+        WriteOptions::new().compression(Some(Compression::Zstd)),
+        WriteOptions::new().compression(Some(Compression::Lz4)),
+        WriteOptions::new().compression(None).chunk_size(Some(2000)),
+        WriteOptions::new().compression(None).use_chunks(false),
+    ];
+    for options in layouts {
+        let Bag { recording: found, notes } = read(&bag(&recording, options, false), &folder).unwrap();
+        assert_eq!(found.joints, recording.joints);
+        assert_eq!(found.features, recording.features);
+        assert_eq!(found.samples.len(), recording.samples.len());
+        for (found, sample) in found.samples.iter().zip(&recording.samples) {
+            assert_eq!((&found.joints, &found.pixels), (&sample.joints, &sample.pixels));
+            assert!((found.time.unwrap() - sample.time.unwrap()).abs() < 1e-9);
+        }
+        for (found, camera) in found.cameras.iter().zip(&recording.cameras) {
+            assert_eq!(
+                (&found.name, found.size, found.fx, found.cy),
+                (&camera.name, camera.size, camera.fx, camera.cy)
+            );
+        }
+        assert!(notes.is_empty(), "{notes:?}");
+    }
+}
+
+#[test]
+fn the_rig_learned_from_a_bag_is_that_of_the_recording_byte_for_byte_in_any_order_of_joints() {
+    let folder = Folder::new("bag-calibrate");
+    let recording = recorded();
+    folder.write(
+        "rig.toml",
+        &format!("[robot]\njoints = [{}]\n", {
+            let joint = |name: &String| format!("{{ name = \"{name}\" }}");
+            recording.joints.iter().map(joint).collect::<Vec<_>>().join(", ")
+        }),
+    );
+    std::fs::write(folder.path().join("bag.mcap"), bag(&recording, WriteOptions::new(), true)).unwrap();
+    let names = recording.joints.join(",");
+    let (said, _) = folder.expect(0, &format!("convert bag.mcap --joints {names} -o converted.jsonl"));
+    assert!(
+        said.starts_with("converted.jsonl: 40 samples of 6 joints, 2 cameras with 12 features, 960 detections"),
+        "{said}"
+    );
+    let mut plain = Recording::read(&folder.path().join("converted.jsonl")).unwrap();
+    // What stands in the file, without the way through a bag.
+    for (sample, other) in plain.samples.iter_mut().zip(&recording.samples) {
+        assert_eq!((&sample.joints, &sample.pixels), (&other.joints, &other.pixels));
+        sample.time = other.time;
+    }
+    plain.write(&folder.path().join("plain.jsonl")).unwrap();
+    folder.expect(0, "calibrate bag.mcap --rig rig.toml -o from-bag.toml");
+    folder.expect(0, "calibrate plain.jsonl --rig rig.toml -o from-plain.toml");
+    assert_eq!(folder.read("from-bag.toml"), folder.read("from-plain.toml"));
+}
+
+#[test]
+fn a_bag_that_is_cut_off_anywhere_is_read_as_far_as_it_goes_or_refused_with_the_reason() {
+    let folder = Folder::new("bag-cut");
+    let recording = recorded();
+    let whole = bag(&recording, WriteOptions::new().compression(None).chunk_size(Some(4000)), false);
+    let (mut shorter, mut refused) = (0, 0);
+    for end in (0..whole.len()).step_by(997) {
+        match read(&whole[..end], &folder) {
+            Ok(Bag { recording: found, notes }) => {
+                assert!(found.samples.len() <= recording.samples.len());
+                if found.samples.len() < recording.samples.len() {
+                    assert!(!notes.is_empty(), "cut at {end}: {} samples and not a word", found.samples.len());
+                    shorter += 1;
+                }
+            }
+            Err(error) => {
+                assert!(error.to_string().contains("bag.mcap"), "{error}");
+                refused += 1;
+            }
+        }
+    }
+    assert!(shorter > 20 && refused >= 1, "{shorter} shorter, {refused} refused");
+    // Bytes that are wrong in the middle end no program.
+    let mut broken = whole.clone();
+    for place in (0..whole.len()).step_by(3001) {
+        broken[place] ^= 0x5a;
+        let _ = read(&broken, &folder);
+        broken[place] = whole[place];
+    }
+}
+
+#[test]
+fn what_a_bag_lacks_is_said_with_what_it_has() {
+    let folder = Folder::new("bag-mistakes");
+    let recording = recorded();
+    std::fs::write(folder.path().join("bag.mcap"), bag(&recording, WriteOptions::new(), false)).unwrap();
+    let (_, error) = folder.expect(2, "convert bag.mcap --joint-topic /nowhere -o out.jsonl");
+    assert!(error.contains("/nowhere") && error.contains("/joint_states"), "{error}");
+    let (_, error) = folder.expect(2, "convert bag.mcap --camera-topic /nowhere -o out.jsonl");
+    assert!(error.contains("bag.mcap") && error.contains("/joint_states"), "{error}");
+    folder.write("no.mcap", "{\"format\":\"handeye-recording\"}");
+    let (_, error) = folder.expect(2, "convert no.mcap -o out.jsonl");
+    assert!(error.contains("no.mcap"), "{error}");
+    assert!(!Path::new(&folder.path().join("out.jsonl")).exists());
+}
