@@ -12,12 +12,9 @@ use handeye::servo::{
 };
 use handeye::simulate::world::{Tracker, World, WorldOptions};
 use handeye::simulate::{SimulateOptions, random_rig, simulate};
-use handeye_solvers::Pose;
-use handeye_solvers::manifold::so3;
-use nalgebra::Vector3;
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
+
+#[path = "common/moved_camera.rs"]
+mod moved_camera;
 
 /// The rig that is known of a true one, and the controller that it makes.
 type Known = fn(&Rig, u64) -> Rig;
@@ -32,8 +29,8 @@ fn main() {
     let kinds: [(&str, Known, Makes); 5] = [
         ("true rig, model-based", same, model_based),
         ("true rig, hybrid", same, hybrid),
-        ("camera moved, model-based", moved, model_based),
-        ("camera moved, hybrid", moved, hybrid),
+        ("camera moved, model-based", moved_camera::with_moved_camera, model_based),
+        ("camera moved, hybrid", moved_camera::with_moved_camera, hybrid),
         ("no rig", same, none),
     ];
     for (name, known, controller) in kinds {
@@ -63,7 +60,7 @@ fn run(seed: u64, known: Known, controller: Makes) -> (Stop, usize) {
     let goal: Vec<Sighting> = names.sightings(&Sample { pixels: world.exact(&joints(1)), ..Sample::default() });
     let settings =
         LoopSettings { tolerance_px: ARRIVED, settled: 1, window: 30, timeout: 100.0, ..LoopSettings::default() };
-    let mut servo = ServoLoop::new(Boxed(controller(&known(&truth, seed))), settings);
+    let mut servo = ServoLoop::new(controller(&known(&truth, seed)), settings);
     servo.aim(&goal);
     let mut commands = 0;
     loop {
@@ -76,27 +73,6 @@ fn run(seed: u64, known: Known, controller: Makes) -> (Stop, usize) {
         }
         commands += usize::from(tick.command != Command::Hold);
         world.execute(&tick.command, 1.0).expect("finite");
-    }
-}
-
-struct Boxed(Box<dyn Controller>);
-
-impl Controller for Boxed {
-    fn aim(&mut self, goal: &[Sighting]) {
-        self.0.aim(goal);
-    }
-
-    fn decide(
-        &mut self,
-        now: &Measurement<'_>,
-        limits: &[&dyn handeye::servo::Limit],
-        dt: f64,
-    ) -> Result<handeye::servo::Decision, handeye::Error> {
-        self.0.decide(now, limits, dt)
-    }
-
-    fn held(&mut self) {
-        self.0.held();
     }
 }
 
@@ -116,16 +92,4 @@ fn none(rig: &Rig) -> Box<dyn Controller> {
 
 fn same(rig: &Rig, _: u64) -> Rig {
     rig.clone()
-}
-
-/// One camera 10 cm and 10 degrees away, in random directions.
-fn moved(rig: &Rig, seed: u64) -> Rig {
-    let random = &mut ChaCha8Rng::seed_from_u64(seed);
-    let mut direction = || Vector3::from_fn(|_, _| random.sample::<f64, _>(StandardNormal)).normalize();
-    let (shift, turn) = (direction() * 0.1, direction() * 10_f64.to_radians());
-    let mut rig = rig.clone();
-    let pose = rig.cameras[0].pose.expect("complete");
-    rig.cameras[0].pose =
-        Some(Pose { rotation: so3::exp(&turn) * pose.rotation, translation: pose.translation + shift });
-    rig
 }

@@ -76,55 +76,7 @@ pub fn run(
             return Err(Error::Unusable("the scene names no `rig`, so there is no world: give one".to_owned()));
         }
     };
-    if let Control::Uncalibrated(uncalibrated) = control {
-        let moves_tip = matches!(scene.takes, Takes::PoseDelta | Takes::PoseVelocity);
-        if moves_tip {
-            return Err(Error::Unusable(format!(
-                "an uncalibrated controller moves joints, this robot takes {}",
-                scene.takes.name()
-            )));
-        }
-        let settings = if uncalibrated.hybrid { Settings::with_rig() } else { Settings::default() };
-        let settings = Settings { gain: uncalibrated.gain.unwrap_or(settings.gain), ..settings };
-        let mut controller = match learned.filter(|_| uncalibrated.hybrid) {
-            Some(learned) => UncalibratedJoints::with_rig(learned, uncalibrated.pixels, settings)?,
-            None if uncalibrated.hybrid => return Err(needs_rig("hybrid")),
-            None => UncalibratedJoints::new(&known.robot.joints, uncalibrated.pixels, settings)?,
-        };
-        controller.takes = scene.takes;
-        return run_with(controller, known, scene, watch);
-    }
-    let Some(known) = learned else {
-        return Err(needs_rig(control.name()));
-    };
-    match control {
-        Control::ModelBased | Control::Uncalibrated(_) => {
-            let mut controller = ModelBased::new(known)?;
-            controller.takes = scene.takes;
-            run_with(controller, known, scene, watch)
-        }
-        Control::ModelBasedTip { speed } => {
-            let mut controller = ModelBasedTip::new(known)?;
-            (controller.takes, controller.speed) = (scene.takes, speed);
-            if !matches!(scene.takes, Takes::PoseDelta | Takes::PoseVelocity) {
-                return Err(Error::Unusable(format!(
-                    "a controller that moves the tip needs a robot that takes pose-deltas or pose-velocities, this takes {}",
-                    scene.takes.name()
-                )));
-            }
-            run_with(controller, known, scene, watch)
-        }
-        Control::ImageBased(settings) => {
-            let mut controller = ImageBased::new(known, settings)?;
-            controller.takes = scene.takes;
-            run_with(controller, known, scene, watch)
-        }
-        Control::PoseBased(settings) => {
-            let mut controller = PoseBased::new(known, settings)?;
-            controller.takes = scene.takes;
-            run_with(controller, known, scene, watch)
-        }
-    }
+    run_with(scene.controller(&control, learned, known)?, known, scene, watch)
 }
 
 fn needs_rig(controller: &str) -> Error {
@@ -133,8 +85,8 @@ fn needs_rig(controller: &str) -> Error {
     ))
 }
 
-fn run_with<C: Controller>(
-    controller: C,
+fn run_with(
+    controller: Box<dyn Controller>,
     known: &Rig,
     scene: &Scene,
     watch: &mut dyn FnMut(&Moment) -> ControlFlow<()>,
@@ -243,6 +195,60 @@ const MOST_TICKS: f64 = 1e6;
 const STRENGTH: f64 = 10.0;
 
 impl Scene {
+    /// The controller. `learned`: the rig that it knows; `known`: whose joints it moves.
+    ///
+    /// Errors: [`Error::Unusable`] where it needs a rig, or does not suit what the robot takes; those of its making.
+    fn controller(&self, control: &Control, learned: Option<&Rig>, known: &Rig) -> Result<Box<dyn Controller>, Error> {
+        let (takes, name) = (self.takes, control.name());
+        let moves_tip = matches!(takes, Takes::PoseDelta | Takes::PoseVelocity);
+        let rig = || learned.ok_or_else(|| needs_rig(name));
+        Ok(match control {
+            Control::ModelBased => {
+                let mut controller = ModelBased::new(rig()?)?;
+                controller.takes = takes;
+                Box::new(controller)
+            }
+            Control::ModelBasedTip { speed } => {
+                let mut controller = ModelBasedTip::new(rig()?)?;
+                (controller.takes, controller.speed) = (takes, *speed);
+                if !moves_tip {
+                    return Err(Error::Unusable(format!(
+                        "a controller that moves the tip needs a robot that takes pose-deltas or pose-velocities, this takes {}",
+                        takes.name()
+                    )));
+                }
+                Box::new(controller)
+            }
+            Control::ImageBased(settings) => {
+                let mut controller = ImageBased::new(rig()?, settings.clone())?;
+                controller.takes = takes;
+                Box::new(controller)
+            }
+            Control::PoseBased(settings) => {
+                let mut controller = PoseBased::new(rig()?, settings.clone())?;
+                controller.takes = takes;
+                Box::new(controller)
+            }
+            Control::Uncalibrated(_) if moves_tip => {
+                return Err(Error::Unusable(format!(
+                    "a controller of kind {name} moves joints, this robot takes {}",
+                    takes.name()
+                )));
+            }
+            Control::Uncalibrated(UncalibratedControl { pixels, gain, hybrid }) => {
+                let settings = if *hybrid { Settings::with_rig() } else { Settings::default() };
+                let settings = Settings { gain: gain.unwrap_or(settings.gain), ..settings };
+                let mut controller = if *hybrid {
+                    UncalibratedJoints::with_rig(rig()?, *pixels, settings)?
+                } else {
+                    UncalibratedJoints::new(&known.robot.joints, *pixels, settings)?
+                };
+                controller.takes = takes;
+                Box::new(controller)
+            }
+        })
+    }
+
     /// The limits for a rig, one by one, with their names.
     fn limits(&self, known: &Rig) -> Vec<(String, Box<dyn Limit>)> {
         let features: Vec<usize> = (0..known.features.len()).collect();

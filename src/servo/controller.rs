@@ -67,3 +67,17 @@ pub trait Controller {
     /// Told when the robot is held in place of a command: it stands still from now on.
     fn held(&mut self) {}
 }
+
+impl<C: Controller + ?Sized> Controller for Box<C> {
+    fn aim(&mut self, goal: &[Sighting]) {
+        (**self).aim(goal);
+    }
+
+    fn decide(&mut self, now: &Measurement<'_>, limits: &[&dyn Limit], dt: f64) -> Result<Decision, Error> {
+        (**self).decide(now, limits, dt)
+    }
+
+    fn held(&mut self) {
+        (**self).held();
+    }
+}

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 pub(super) struct RigForesight {
     arm: Arm,
     reader: PixelReader,
-    /// Joints that lead to the goal, asked for once.
+    /// Joints that lead to the goal that servoing began with, asked for once: where a search begins, not where it ends.
     solution: Option<Option<Vec<f64>>>,
     /// None where the rig does not say how well it is known.
     bounds: Option<PredictionBounds>,

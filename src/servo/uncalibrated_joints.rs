@@ -161,7 +161,7 @@ fn find<'a>(seen: &'a [Sighting], goal: &Sighting) -> Option<&'a Sighting> {
 }
 
 impl Controller for UncalibratedJoints {
-    /// A goal of the same features elsewhere keeps what was learned; another one begins anew.
+    /// A goal of the same features elsewhere keeps what was learned; another one begins anew, and so does any after giving up.
     fn aim(&mut self, goal: &[Sighting]) {
         self.goal = goal.to_vec();
         let changes: Option<Vec<f64>> = self
@@ -171,7 +171,9 @@ impl Controller for UncalibratedJoints {
             .collect::<Option<Vec<_>>>()
             .map(|changes| changes.concat());
         let kept = match (&mut self.servo, changes) {
-            (Some(servo), Some(changes)) => servo.shift(&changes).is_ok(),
+            (Some(servo), Some(changes)) if !matches!(servo.phase(), Phase::Stopped(_)) => {
+                servo.shift(&changes).is_ok()
+            }
             _ => false,
         };
         if kept {

@@ -172,8 +172,146 @@ fn recorded() -> Recording {
 }
 
 fn read(bytes: &[u8], folder: &Folder) -> Result<Bag, handeye::Error> {
+    // In the order of a rig, so that nothing has to be said of it.
+    let known_joints = recorded().joints;
+    read_with(bytes, folder, &BagOptions { known_joints, ..BagOptions::default() })
+}
+
+fn read_with(bytes: &[u8], folder: &Folder, options: &BagOptions) -> Result<Bag, handeye::Error> {
     std::fs::write(folder.path().join("bag.mcap"), bytes).unwrap();
-    Bag::read(&folder.path().join("bag.mcap"), &BagOptions::default())
+    Bag::read(&folder.path().join("bag.mcap"), options)
+}
+
+const POSE: &str = "geometry_msgs/Pose pose\n";
+const TRANSFORMS: &str = "geometry_msgs/TransformStamped[] transforms\n";
+const SPACE: &str = "================================================================================\n\
+    MSG: geometry_msgs/Pose\ngeometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n\
+    ================================================================================\n\
+    MSG: geometry_msgs/TransformStamped\nstd_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n\
+    ================================================================================\n\
+    MSG: geometry_msgs/Transform\ngeometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n\
+    ================================================================================\n\
+    MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n\
+    ================================================================================\n\
+    MSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n\
+    ================================================================================\n\
+    MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n";
+
+/// An image of one tag each 0.1 s from 1 s on, and the messages beside: topic, type, schema, time [ns] and bytes.
+fn images_beside(n: u64, others: &[(&str, &str, String, u64, Vec<u8>)]) -> Vec<u8> {
+    let mut writer = WriteOptions::new().create(Cursor::new(Vec::new())).unwrap();
+    let mut write = |topic: &str, kind: &str, text: &str, time: u64, data: &[u8]| {
+        let schema = writer.add_schema(kind, "ros2msg", text.as_bytes()).unwrap();
+        let channel_id = writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).unwrap();
+        let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
+        writer.write_to_known_channel(&header, data).unwrap();
+    };
+    let tags = format!("{HEADER}{TAGS}{HEADER_PARTS}{TAGS_PARTS}");
+    for index in 0..n {
+        let stamp = 1_000_000_000 + EVERY * index;
+        let mut cdr = Cdr::header(stamp, "left");
+        cdr.int(1);
+        cdr.text("tag36h11");
+        (0..4).for_each(|_| cdr.int(0));
+        (0..19).for_each(|number| cdr.float(f64::from(number)));
+        write("/left/tags", "apriltag_msgs/msg/AprilTagDetectionArray", &tags, stamp, &cdr.0);
+    }
+    for (topic, kind, text, time, data) in others {
+        write(topic, kind, text, *time, data);
+    }
+    writer.finish().unwrap();
+    writer.into_inner().into_inner()
+}
+
+/// A pose: origin, then the quaternion of a turn about z.
+fn put_pose(cdr: &mut Cdr, xyz: [f64; 3], angle: f64) {
+    xyz.iter().chain(&[0.0, 0.0, (0.5 * angle).sin(), (0.5 * angle).cos()]).for_each(|number| cdr.float(*number));
+}
+
+fn transform(parent: &str, child: &str, time: u64, xyz: [f64; 3], angle: f64) -> Vec<u8> {
+    let mut cdr = Cdr::new();
+    cdr.int(1);
+    cdr.int((time / 1_000_000_000) as u32);
+    cdr.int((time % 1_000_000_000) as u32);
+    cdr.text(parent);
+    cdr.text(child);
+    put_pose(&mut cdr, xyz, angle);
+    cdr.0
+}
+
+#[test]
+fn states_are_interpolated_to_the_stamps_of_images_and_those_outside_are_left_open() {
+    let folder = Folder::new("bag-states");
+    let names = ["b".to_owned(), "a".to_owned()];
+    let state = format!("{HEADER}{JOINTS}{HEADER_PARTS}");
+    let pose_text = format!("{HEADER}{POSE}{HEADER_PARTS}{SPACE}");
+    // Images at 1.0, 1.1, 1.2 and 1.3 s; states at 1.05 and 1.25 s.
+    let times = [1_050_000_000, 1_250_000_000];
+    let mut others = Vec::new();
+    for (index, time) in times.into_iter().enumerate() {
+        let part = index as f64;
+        let joints = joint_state(time, &names, &[part, 10.0 - 2.0 * part]);
+        others.push(("/joint_states", "sensor_msgs/msg/JointState", state.clone(), time, joints));
+        let mut cdr = Cdr::header(time, "base");
+        put_pose(&mut cdr, [part, 0.0, 2.0], part);
+        others.push(("/tip", "geometry_msgs/msg/PoseStamped", pose_text.clone(), time, cdr.0));
+    }
+    let joints = vec!["a".to_owned(), "b".to_owned()];
+    let options = BagOptions { joints, pose_topic: Some("tip".to_owned()), ..BagOptions::default() };
+    let Bag { recording, notes } = read_with(&images_beside(4, &others), &folder, &options).unwrap();
+    assert_eq!(recording.joints, ["a", "b"]);
+    assert_eq!(recording.samples.len(), 4);
+    for (index, sample) in recording.samples.iter().enumerate() {
+        let part = (index as f64 * 0.1 - 0.05) / 0.2;
+        if !(0.0..=1.0).contains(&part) {
+            assert_eq!((&sample.joints, sample.pose.is_none()), (&None, true), "sample {index}");
+            continue;
+        }
+        let [a, b] = sample.joints.as_ref().unwrap()[..] else { panic!() };
+        assert!((a - (10.0 - 2.0 * part)).abs() < 1e-12 && (b - part).abs() < 1e-12, "{a} {b} at {part}");
+        let pose = sample.pose.unwrap();
+        let angle = pose.rotation[(1, 0)].atan2(pose.rotation[(0, 0)]);
+        assert!((angle - part).abs() < 1e-12 && (pose.translation.x - part).abs() < 1e-12, "{pose:?} at {part}");
+    }
+    let said = notes.join("\n");
+    assert!(said.contains("joint states are interpolated, between two that are up to 0.200000 s apart"), "{said}");
+    assert!(said.contains("2 of 4 samples are outside the joint states"), "{said}");
+}
+
+#[test]
+fn the_tip_is_found_in_the_tree_of_frames_and_a_way_that_is_not_there_is_refused() {
+    let folder = Folder::new("bag-frames");
+    let text = format!("{TRANSFORMS}{HEADER_PARTS}{SPACE}");
+    let kind = "tf2_msgs/msg/TFMessage";
+    let at = |time| 1_000_000_000 + time;
+    // world -> base stands, world -> arm moves along x and turns, arm -> tip stands.
+    let others = [
+        (
+            "/tf_static",
+            kind,
+            text.clone(),
+            1,
+            transform("world", "base", 0, [1.0, 2.0, 0.0], std::f64::consts::FRAC_PI_2),
+        ),
+        ("/tf_static", kind, text.clone(), 2, transform("arm", "tip", 0, [0.0, 0.5, 0.0], 0.0)),
+        ("/tf", kind, text.clone(), at(0), transform("world", "arm", at(0), [1.0, 2.0, 3.0], 0.0)),
+        ("/tf", kind, text.clone(), at(2 * EVERY), transform("world", "arm", at(2 * EVERY), [3.0, 2.0, 3.0], 0.4)),
+    ];
+    let bytes = images_beside(3, &others);
+    let frames = |tip: &str| BagOptions { frames: Some(["base".to_owned(), tip.to_owned()]), ..BagOptions::default() };
+    let found = read_with(&bytes, &folder, &frames("tip")).unwrap().recording;
+    for (index, sample) in found.samples.iter().enumerate() {
+        let part = index as f64 / 2.0;
+        let (x, angle) = (1.0 + 2.0 * part, 0.4 * part);
+        // The tip in the world, then as the base sees it, which is turned by a quarter.
+        let world = [x - 0.5 * angle.sin() - 1.0, 2.0 + 0.5 * angle.cos() - 2.0];
+        let pose = sample.pose.unwrap();
+        let expected = [world[1], -world[0], 3.0];
+        let off = (0..3).map(|k| (pose.translation[k] - expected[k]).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-12, "sample {index}: {:?} and {expected:?}", pose.translation);
+    }
+    let error = read_with(&bytes, &folder, &frames("gripper")).unwrap_err().to_string();
+    assert!(error.contains("no way from `base` to `gripper`") && error.contains("arm, base, tip"), "{error}");
 }
 
 #[test]
@@ -218,6 +356,8 @@ fn the_rig_learned_from_a_bag_is_that_of_the_recording_byte_for_byte_in_any_orde
     );
     std::fs::write(folder.path().join("bag.mcap"), bag(&recording, WriteOptions::new(), true)).unwrap();
     let names = recording.joints.join(",");
+    let (said, _) = folder.expect(0, "convert bag.mcap -o as-it-stands.jsonl");
+    assert!(said.contains("in the order of the first joint state: wrist_3, wrist_2"), "{said}");
     let (said, _) = folder.expect(0, &format!("convert bag.mcap --joints {names} -o converted.jsonl"));
     assert!(
         said.starts_with("converted.jsonl: 40 samples of 6 joints, 2 cameras with 12 features, 960 detections"),

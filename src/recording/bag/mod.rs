@@ -112,34 +112,16 @@ impl Bag {
             }
         }
         let names = std::mem::take(&mut states.names);
-        let states =
-            joints.into_iter().zip(poses).map(|(joints, pose)| (joints.map(|at| at.value), pose.map(|at| at.value)));
-        let samples = groups.iter().zip(states).map(|(group, (joints, pose))| (group, joints, pose));
-        let sample = |(group, joints, pose): (&Group, Option<Vec<f64>>, Option<Pose>)| Sample {
-            time: Some(group.time as f64 / 1e9),
-            joints,
-            pose,
-            pixels: group
-                .images
-                .iter()
-                .flat_map(|&index| {
-                    let image = &images.images[index];
-                    let camera = camera_of_source[image.source];
-                    image.features.iter().map(move |&(feature, pixel)| Detection { camera, feature, pixel })
-                })
-                .collect(),
-            ..Sample::default()
-        };
-        let mut samples: Vec<Sample> = samples.map(sample).collect();
-        let (features, places) = images.features.in_natural_order();
-        let mut twice = 0;
-        for sample in &mut samples {
-            let before = sample.pixels.len();
-            sample.pixels.sort_by_key(|detection| (detection.camera, detection.feature));
-            sample.pixels.dedup_by_key(|detection| (detection.camera, detection.feature));
-            twice += before - sample.pixels.len();
-            sample.renumber(&places);
+        if options.joints.is_empty() && !names.is_empty() && names != options.known_joints {
+            let order = names.join(", ");
+            notes.push(format!(
+                "joints are in the order of the first joint state: {order}; where that is not from base to tip, give a rig with these names or \
+                 `handeye convert --joints`"
+            ));
         }
+        let states = joints.into_iter().zip(poses);
+        let states = states.map(|(joints, pose)| (joints.map(|at| at.value), pose.map(|at| at.value)));
+        let (samples, features, twice) = assemble(&groups, images, &camera_of_source, states);
         if twice > 0 {
             notes
                 .push(format!("{twice} detections are of a feature that the same image has already, and are left out"));
@@ -147,6 +129,36 @@ impl Bag {
         let joints = names.iter().map(|name| tidy(name)).collect();
         Ok(Bag { recording: Recording { joints, cameras, features, samples }, notes })
     }
+}
+
+/// The samples, the features that they count by, and how many detections of a feature that its image had already were left out.
+/// `states`: joints and tip pose of each group.
+fn assemble(
+    groups: &[Group],
+    images: Images,
+    camera_of_source: &[u32],
+    states: impl Iterator<Item = (Option<Vec<f64>>, Option<Pose>)>,
+) -> (Vec<Sample>, Vec<String>, usize) {
+    let (features, places) = images.features.in_natural_order();
+    let images = images.images;
+    let detections = |&index: &usize| {
+        let image = &images[index];
+        let camera = camera_of_source[image.source];
+        image.features.iter().map(move |&(feature, pixel)| Detection { camera, feature, pixel })
+    };
+    let mut twice = 0;
+    let sample = |(group, (joints, pose)): (&Group, (Option<Vec<f64>>, Option<Pose>))| {
+        let mut pixels: Vec<Detection> = group.images.iter().flat_map(detections).collect();
+        let before = pixels.len();
+        pixels.sort_by_key(|detection| (detection.camera, detection.feature));
+        pixels.dedup_by_key(|detection| (detection.camera, detection.feature));
+        twice += before - pixels.len();
+        let mut sample = Sample { time: Some(group.time as f64 / 1e9), joints, pose, pixels, ..Sample::default() };
+        sample.renumber(&places);
+        sample
+    };
+    let samples = groups.iter().zip(states).map(sample).collect();
+    (samples, features, twice)
 }
 
 fn note_on_groups(groups: &[Group]) -> Option<String> {

@@ -2,6 +2,7 @@
 use super::estimate::{Estimate, dot};
 use super::settings::Update;
 use super::signals::Row;
+use std::collections::BTreeSet;
 
 /// A motion, and the errors before and after it [px]; NaN where a row was not seen.
 pub(super) struct Lesson<'a> {
@@ -103,8 +104,8 @@ fn doubt(rows: &[Row], estimate: &mut Estimate, lesson: &Lesson<'_>) {
     if square == 0.0 {
         return;
     }
-    let cameras = 1 + lesson.seen.iter().map(|&row| rows[row].camera).max().unwrap_or(0);
-    for camera in 0..cameras {
+    let cameras: BTreeSet<usize> = lesson.seen.iter().map(|&row| rows[row].camera).collect();
+    for camera in cameras {
         let of_camera = || lesson.seen.iter().copied().filter(|&row| rows[row].camera == camera);
         let (mut ratio, mut excess, mut scale, mut count) = (0.0, 0.0, 0.0, 0.0_f64);
         for row in of_camera() {

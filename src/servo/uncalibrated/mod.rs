@@ -3,8 +3,8 @@
 //! Whatever is controlled are [`Quantity`]s: joints, coordinates of a tip, the heading of a drone. Whatever is seen are rows: errors in
 //! pixels that shall become 0, each with its [`Row::sd`]. [`Uncalibrated`] explores, servoes through the same constrained step as with a
 //! rig, and stops where it must. A [`Foresight`], such as a rig that may be outdated, takes the place of exploring and is corrected on the way.
-//! [`crate::servo::UncalibratedJoints`] is the controller for joints and pixels around it. After Ramirez, "Towards Practical Uncalibrated Visual Servoing", 2016; [`Settings::plain`] is his
-//! controller, the defaults are ours.
+//! [`crate::servo::UncalibratedJoints`] is the controller for joints and pixels around it. After Ramirez, "Towards Practical Uncalibrated
+//! Visual Servoing", 2016; [`Settings::plain`] is his controller, the defaults are ours.
 mod checks;
 mod controller;
 mod estimate;
