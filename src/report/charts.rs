@@ -99,9 +99,9 @@ pub(super) fn strips(strips: &[Strip]) -> String {
     for (row, strip) in strips.iter().enumerate() {
         let y = 34.0 * row as f64 + 20.0;
         let [low, high] = strip.range;
-        let x = |value: f64| 170.0 + 400.0 * (value - low) / (high - low).max(1e-12);
+        let x = |value: f64| 170.0 + 360.0 * (value - low) / (high - low).max(1e-12);
         let _ = write!(svg, "<text x=\"0\" y=\"{:.0}\">{}</text>", y + 4.0, escaped(&strip.name));
-        let _ = write!(svg, "<path class=\"axis\" d=\"M170 {y}H570\"/>");
+        let _ = write!(svg, "<path class=\"axis\" d=\"M170 {y}H530\"/>");
         for value in strip.values.iter().step_by(strip.values.len().div_ceil(400).max(1)) {
             let _ = write!(
                 svg,
@@ -112,7 +112,7 @@ pub(super) fn strips(strips: &[Strip]) -> String {
             );
         }
         let _ = write!(svg, "<text x=\"164\" y=\"{0:.0}\" text-anchor=\"end\">{low:.2}</text>", y + 4.0);
-        let _ = write!(svg, "<text x=\"600\" y=\"{0:.0}\" text-anchor=\"end\">{high:.2}</text>", y + 18.0);
+        let _ = write!(svg, "<text x=\"536\" y=\"{0:.0}\">{high:.2}</text>", y + 4.0);
     }
     svg + "</svg>"
 }
