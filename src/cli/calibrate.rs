@@ -2,7 +2,7 @@
 use super::answer::Answer;
 use super::counts::learned_in_words;
 use super::folds::Folds;
-use super::inputs::{check_output, is_same, read_recordings_with_new, read_rig};
+use super::inputs::{check_output, is_same, read_recordings_with_new, read_rig, write_output};
 use super::noise;
 use super::progress::Bar;
 use super::trust;
@@ -10,13 +10,16 @@ use super::words::{cameras_json, count, duration, error_table, points_json};
 use clap::Args;
 use handeye::Error;
 use handeye::calibrate::{
-    Calibration, Distance, Errors, Finding, NoiseTrial, Options, Progress, Report, TargetReport, TipDeviation,
-    calibrate, relearn, select_noise,
+    Calibration, Distance, Errors, Finding, NoiseTrial, Options, Progress, Report, SuggestOptions, TargetReport,
+    TipDeviation, calibrate, relearn, select_noise, suggest,
 };
 use handeye::report;
 use handeye::rig::Rig;
 use serde_json::{Value, json};
 use std::path::PathBuf;
+
+/// Positions to move to next that a page suggests.
+const SUGGESTED: usize = 3;
 
 /// Learn what is unknown of a rig from recordings, and refine the rest
 ///
@@ -106,15 +109,19 @@ impl Calibrate {
         let output = self.output.display();
         if let Some(path) = &self.report {
             let tables = folds.iter().map(Folds::as_table).collect::<Vec<_>>();
+            // Where it cannot be said where to move, as for an arm of which no range is known, the page goes without.
+            let next = SuggestOptions { count: SUGGESTED, ..SuggestOptions::default() };
+            let suggestion = suggest(&calibration.rig, Some(&recording), Some(&rig), &next).ok();
             let subject = report::Subject {
                 title: &output.to_string(),
                 before: &rig,
                 calibration: &calibration,
                 recording: &recording,
+                suggestion: suggestion.as_ref(),
                 tables: &tables,
             };
             let page = report::html(&subject)?;
-            std::fs::write(path, page).map_err(|source| Error::Io { path: path.clone(), source })?;
+            write_output(path, &page)?;
         }
         let Calibration { rig: learned, report } = calibration;
         let mut answer = Answer::new(describe(&rig, &learned, &report, seconds), report_json(&report));

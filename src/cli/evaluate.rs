@@ -1,10 +1,11 @@
 //! `handeye evaluate`: how well a rig predicts a recording.
 use super::answer::Answer;
-use super::inputs::{read_recordings, read_rig};
+use super::inputs::{check_output, read_recordings, read_rig, write_output};
 use super::words::{cameras_json, count, error_table, errors_json, mm, px};
 use clap::Args;
 use handeye::Error;
 use handeye::calibrate::{Evaluation, evaluate};
+use handeye::report::evaluation_html;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -20,8 +21,9 @@ const NAMED: usize = 5;
 /// A recording that the rig was not learned from tells how good the rig is; its own tells only how well it was fitted.
 #[derive(Args)]
 #[command(after_help = "\
-Example:
-  handeye evaluate learned.toml fresh.jsonl")]
+Examples:
+  handeye evaluate learned.toml fresh.jsonl
+  handeye evaluate learned.toml fresh.jsonl --report page.html")]
 pub struct Evaluate {
     /// A rig file in which every value is given
     #[arg(value_name = "LEARNED")]
@@ -29,13 +31,26 @@ pub struct Evaluate {
     /// Recordings of that rig
     #[arg(value_name = "REC", required = true)]
     recordings: Vec<PathBuf>,
+    /// Also write a page to read: residuals of every camera, coverage, worst samples, a view that can be turned
+    #[arg(long, value_name = "HTML")]
+    report: Option<PathBuf>,
 }
 
 impl Evaluate {
     pub fn run(&self) -> Result<Answer, Error> {
         let input = read_rig(&self.rig)?;
         let recording = read_recordings(&self.recordings, Some(&input))?;
+        if let Some(page) = &self.report {
+            let inputs: Vec<PathBuf> = self.recordings.iter().chain([&self.rig]).cloned().collect();
+            check_output(page, &inputs)?;
+        }
         let evaluation = evaluate(&input.rig, &recording)?;
+        if let Some(path) = &self.report {
+            let recordings: Vec<String> = self.recordings.iter().map(|path| path.display().to_string()).collect();
+            let title = format!("{} on {}", self.rig.display(), recordings.join(", "));
+            let page = evaluation_html(&title, &input.rig, &recording, &evaluation)?;
+            write_output(path, &page)?;
+        }
         Ok(Answer::new(text(&evaluation), json(&evaluation)))
     }
 }

@@ -1,6 +1,6 @@
 //! `handeye experiment`: published experiments in simulation, beside their figures.
 use super::answer::Answer;
-use super::inputs::check_output;
+use super::inputs::{check_output, write_output};
 use super::table::Table;
 use super::words::count;
 use clap::Args;
@@ -49,7 +49,7 @@ impl ExperimentCommand {
             let title = format!("{}: {}", experiment.name, experiment.about);
             let drawing = svg(&title, &outcome)
                 .ok_or_else(|| Error::Unusable(format!("`{}` has no curve to draw with --plot", experiment.name)))?;
-            std::fs::write(path, drawing).map_err(|source| Error::Io { path: path.clone(), source })?;
+            write_output(path, &drawing)?;
         }
         Ok(Answer::new(text(experiment, &options, &outcome), to_json(experiment, &options, &outcome)))
     }

@@ -1,11 +1,11 @@
 //! `handeye export`: a rig as a file that others read.
 use super::answer::Answer;
-use super::inputs::{RigInput, check_output, read_rig};
+use super::inputs::{RigInput, check_output, read_rig, write_output};
 use clap::{Args, ValueEnum};
 use handeye::Error;
 use handeye::export::{to_camchain, to_intrinsics, to_static_transforms, to_tf, to_urdf};
 use handeye::intrinsics::{Intrinsics, to_camera_info, to_opencv};
-use handeye::rig::{Rig, read_text, replace_file};
+use handeye::rig::{Rig, read_text};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -67,7 +67,7 @@ impl Export {
             json["text"] = json!(text);
             return Ok(Answer::new(text, json));
         };
-        replace_file(output, |file| file.write_all(text.as_bytes()))?;
+        write_output(output, &text)?;
         Ok(Answer::new(format!("{} is written\n", output.display()), json))
     }
 

@@ -2,7 +2,7 @@
 use super::answer::remark;
 use handeye::Error;
 use handeye::recording::{Bag, BagOptions, Recording, Sample};
-use handeye::rig::{Rig, catalog, matches};
+use handeye::rig::{Rig, catalog, matches, replace_file};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -105,4 +105,9 @@ pub fn check_output(path: &Path, inputs: &[PathBuf]) -> Result<(), Error> {
             Err(Error::Unusable(format!("{}: this would be written over, and it is an input too", path.display())))
         }
     }
+}
+
+/// Writes a text to a file, of which whoever reads sees the old one or the new.
+pub fn write_output(path: &Path, text: &str) -> Result<(), Error> {
+    replace_file(path, |file| file.write_all(text.as_bytes()))
 }

@@ -1,11 +1,12 @@
 //! `handeye servo`: a closed loop in simulation.
 use super::answer::Answer;
-use super::inputs::{check_output, read_rig};
+use super::inputs::{check_output, is_same, read_rig, write_output};
 use super::progress::Line;
 use super::table::Table;
 use super::words::count;
 use clap::Args;
 use handeye::Error;
+use handeye::report::servo_html;
 use handeye::rig::Rig;
 use handeye::scene::{self, Moment, Run, Scene};
 use handeye::servo::{Command, Stop};
@@ -24,6 +25,7 @@ use std::path::{Path, PathBuf};
     after_help = "\
 Examples:
   handeye servo learned.toml ur5-reach --plot reach.svg    a shipped scene
+  handeye servo learned.toml ur5-reach --report reach.html  an animation to look at
   handeye servo learned.toml scene.toml --json
   handeye servo ur5-uncalibrated                           without any rig
   handeye servo ur5 ur5-noisy --seed 7"
@@ -41,6 +43,9 @@ pub struct Servo {
     /// Draw the errors against time and the features' paths in every image
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
+    /// Also write a page to read: the loop as an animation over the images, errors and joints against time, what held it back
+    #[arg(long, value_name = "HTML")]
+    report: Option<PathBuf>,
 }
 
 /// Rows of the printed table at most.
@@ -50,9 +55,14 @@ impl Servo {
     pub fn run(&self, is_json: bool) -> Result<Answer, Error> {
         let input = self.rig.as_deref().map(read_rig).transpose()?;
         let mut scene = read_scene(&self.scene)?;
-        if let Some(plot) = &self.plot {
-            let inputs: Vec<PathBuf> = self.rig.iter().chain([&self.scene]).cloned().collect();
-            check_output(plot, &inputs)?;
+        let inputs: Vec<PathBuf> = self.rig.iter().chain([&self.scene]).cloned().collect();
+        for output in self.plot.iter().chain(&self.report) {
+            check_output(output, &inputs)?;
+        }
+        if let (Some(plot), Some(page)) = (&self.plot, &self.report)
+            && is_same(plot, page)
+        {
+            return Err(Error::Unusable(format!("{}: given for two outputs", page.display())));
         }
         scene.world.seed = self.seed.unwrap_or(scene.world.seed);
         let line = Line::new(is_json);
@@ -64,8 +74,12 @@ impl Servo {
         drop(line);
         let title = scene.name.clone().unwrap_or_else(|| self.scene.display().to_string());
         if let Some(path) = &self.plot {
-            std::fs::write(path, scene::svg(&title, &run))
-                .map_err(|source| Error::Io { path: path.clone(), source })?;
+            write_output(path, &scene::svg(&title, &run))?;
+        }
+        let world = scene.rig.as_ref().or(known);
+        if let (Some(path), Some(world)) = (&self.report, world) {
+            let page = servo_html(&title, world, &run)?;
+            write_output(path, &page)?;
         }
         let nothing = Rig::default();
         let rig = known.or(scene.rig.as_ref()).unwrap_or(&nothing);

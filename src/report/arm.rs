@@ -1,22 +1,36 @@
 //! The view that can be turned: arm, cameras and features, where the rig puts them.
-use super::Subject;
 use super::page::Page;
 use super::residuals::{Placed, is_inner};
 use crate::Error;
+use crate::recording::Recording;
 use crate::rig::{Model, Parent, Rig};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 
-/// Arms that are drawn besides the first, and tips at most.
+/// Arms that are drawn besides the first, tips at most, and arms that are shown one after the other.
 const ARMS: usize = 8;
 const TIPS: usize = 500;
+const STATES: usize = 500;
+
+/// Which arms are drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Shown {
+    /// The first and a few others, spread over the samples.
+    Few,
+    /// One after the other: that of the moment which the page shows. There are at most [`thinned`] of them.
+    Each,
+}
+
+/// Every how many samples are shown where each of so many shall be.
+pub(super) fn thinned(count: usize) -> usize {
+    count.div_ceil(STATES).max(1)
+}
 
 /// Draws the arm in some samples, the tip in all.
-pub(super) fn view(page: &mut Page, subject: &Subject<'_>) -> Result<(), Error> {
-    let rig = &subject.calibration.rig;
+pub(super) fn view(page: &mut Page, rig: &Rig, recording: &Recording, shown: Shown) -> Result<(), Error> {
     let model = Model::new(rig)?;
-    let samples = &subject.recording.samples;
+    let samples = &recording.samples;
     let of_sample = |sample: &crate::recording::Sample| {
         let joints = sample.joints.as_ref().filter(|joints| joints.len() == model.chain.len() && !joints.is_empty());
         let placed = joints.map(|joints| Placed { links: model.links(joints), is_tip_alone: false });
@@ -27,23 +41,27 @@ pub(super) fn view(page: &mut Page, subject: &Subject<'_>) -> Result<(), Error> 
         states.push(Placed { links: model.links(&vec![0.0; model.chain.len()]), is_tip_alone: false });
     }
     let spread = |most: usize| (0..states.len()).step_by(states.len().div_ceil(most).max(1));
-    let points = |links: &[Pose]| links.iter().map(|link| numbers(&link.translation)).collect::<Vec<_>>();
+    let arms: Vec<usize> = match shown {
+        Shown::Few => spread(ARMS + 1).collect(),
+        Shown::Each => (0..states.len()).step_by(thinned(states.len())).collect(),
+    };
     let tip = |placed: &Placed| placed.links[placed.links.len() - 1].translation;
-    let first = &states[0];
-    let is_placed = |parent: Parent| !(first.is_tip_alone && is_inner(parent, &model));
-    let features = model.features.iter().filter(|feature| is_placed(feature.parent));
-    let features: Vec<Vector3<f64>> =
-        features.map(|feature| model.carrier(feature.parent, &first.links).transform(&feature.xyz)).collect();
-    let cameras: Vec<(usize, Pose)> = (model.cameras.iter().enumerate())
-        .filter(|(_, camera)| is_placed(camera.parent))
-        .map(|(index, camera)| (index, model.carrier(camera.parent, &first.links) * camera.pose))
-        .collect();
+    let is_placed = |parent: Parent| !(states[0].is_tip_alone && is_inner(parent, &model));
+    let features = |state: &Placed| -> Vec<Vector3<f64>> {
+        let placed = model.features.iter().filter(|feature| is_placed(feature.parent));
+        placed.map(|feature| model.carrier(feature.parent, &state.links).transform(&feature.xyz)).collect()
+    };
+    let cameras = |state: &Placed| -> Vec<(usize, Pose)> {
+        let placed = model.cameras.iter().enumerate().filter(|(_, camera)| is_placed(camera.parent));
+        placed.map(|(index, camera)| (index, model.carrier(camera.parent, &state.links) * camera.pose)).collect()
+    };
     let tips: Vec<Vector3<f64>> = spread(TIPS).map(|index| tip(&states[index])).collect();
+    let (first_features, first_cameras) = (features(&states[0]), cameras(&states[0]));
     let all = || {
         tips.iter()
             .copied()
-            .chain(features.iter().copied())
-            .chain(cameras.iter().map(|(_, pose)| pose.translation))
+            .chain(first_features.iter().copied())
+            .chain(first_cameras.iter().map(|(_, pose)| pose.translation))
             .chain([model.base.translation])
     };
     let count = all().count() as f64;
@@ -53,19 +71,33 @@ pub(super) fn view(page: &mut Page, subject: &Subject<'_>) -> Result<(), Error> 
         let end = model.base.transform(&(Vector3::ith(k, 0.15 * radius)));
         json!([numbers(&model.base.translation), numbers(&end)])
     };
+    // What the arm carries moves with it where arms follow each other.
+    let moves = shown == Shown::Each;
+    let carried = |is_carried: bool| if is_carried && moves { arms.clone() } else { vec![0] };
+    let with_features = carried(model.features.iter().any(|feature| feature.parent != Parent::World));
+    let with_cameras = carried(model.cameras.iter().any(|camera| camera.parent != Parent::World));
+    let frusta = |index: &usize| -> Value {
+        let placed = cameras(&states[*index]);
+        placed.iter().map(|(camera, pose)| frustum(rig, *camera, pose, 0.15 * radius)).collect()
+    };
+    let arm = |index: &usize| -> Value { states[*index].links.iter().map(|link| numbers(&link.translation)).collect() };
     let data = json!({
         "centre": numbers(&centre),
         "radius": radius,
-        "arms": spread(ARMS + 1).map(|index| points(&states[index].links)).collect::<Vec<_>>(),
+        "moves": moves,
+        "arms": arms.iter().map(arm).collect::<Vec<_>>(),
         "tips": tips.iter().map(numbers).collect::<Vec<_>>(),
-        "features": features.iter().map(numbers).collect::<Vec<_>>(),
-        "cameras": cameras.iter().map(|(index, pose)| frustum(rig, *index, pose, 0.15 * radius)).collect::<Vec<_>>(),
+        "features": with_features.iter().map(|index| features(&states[*index]).iter().map(numbers).collect()).collect::<Vec<Value>>(),
+        "cameras": with_cameras.iter().map(frusta).collect::<Vec<_>>(),
         "axes": (0..3).map(axis).collect::<Vec<_>>(),
     });
     page.section("view-section", "Where everything is");
     page.view(
         &data.to_string(),
-        "drag to turn: the arm in its first sample and in others, the tip in all, features, cameras; axes at the base",
+        match shown {
+            Shown::Few => "drag to turn: the arm in its first sample and in others, the tip in all, features, cameras; axes at the base",
+            Shown::Each => "drag to turn: the arm at the moment shown above and at first, the way of the tip, features, cameras; axes at the base",
+        },
     );
     Ok(())
 }

@@ -1,5 +1,7 @@
 //! The drawings: each a function from numbers to SVG whose colours are the page's.
 use super::residuals::Residual;
+use crate::recording::Detection;
+use crate::scene::Moment;
 use crate::svg::{escaped, points};
 use std::fmt::Write;
 
@@ -122,6 +124,102 @@ pub(super) struct Strip {
     pub name: String,
     pub range: [f64; 2],
     pub values: Vec<f64>,
+}
+
+/// A quantity against time.
+pub(super) struct Curve<'a> {
+    /// What it is, with its unit.
+    pub words: &'a str,
+    /// Time [s] and value; NaN where it is not known.
+    pub values: &'a [(f64, f64)],
+    /// On a logarithmic ordinate; what is not above 0 then lies at its foot.
+    pub is_logarithmic: bool,
+    /// Values that are marked by lines, such as limits.
+    pub bounds: &'a [f64],
+}
+
+/// The curve, from the first time to the last.
+pub(super) fn curve(curve: &Curve<'_>) -> String {
+    let [left, top, width, height] = [56.0, 24.0, 524.0, 180.0];
+    let scaled = |value: f64| if curve.is_logarithmic { value.max(1e-12).log10() } else { value };
+    let finite = || curve.values.iter().map(|(_, value)| *value).chain(curve.bounds.iter().copied());
+    let known = || finite().filter(|value| value.is_finite() && (!curve.is_logarithmic || *value > 0.0)).map(scaled);
+    let (low, high) = known().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), value| (a.min(value), b.max(value)));
+    let (low, high) = match (curve.is_logarithmic, low < high) {
+        (true, _) if low.is_finite() => (low.floor(), high.ceil().max(low.floor() + 1.0)),
+        (false, true) => (low - 0.05 * (high - low), high + 0.05 * (high - low)),
+        (false, false) if low.is_finite() => (low - 1.0, low + 1.0),
+        _ => (0.0, 1.0),
+    };
+    let first = curve.values.first().map_or(0.0, |(time, _)| *time);
+    let span = curve.values.last().map_or(0.0, |(time, _)| time - first).max(1e-9);
+    let x = |time: f64| left + width * (time - first) / span;
+    let y = |value: f64| top + height * (1.0 - ((scaled(value) - low) / (high - low)).clamp(0.0, 1.0));
+    let mut svg = open(600.0, 240.0);
+    let _ = write!(svg, "<text x=\"{left}\" y=\"14\">{}</text>", escaped(curve.words));
+    let _ = write!(svg, "<path class=\"axis\" d=\"M{left} {top}V{0}H{1}\"/>", top + height, left + width);
+    let ticks: Vec<f64> = if curve.is_logarithmic {
+        let every = ((high - low) / 6.0).ceil().max(1.0);
+        (0..)
+            .map(|k| low + every * f64::from(k))
+            .take_while(|tick| *tick <= high)
+            .map(|tick| 10.0_f64.powf(tick))
+            .collect()
+    } else {
+        (0..=4).map(|k| low + (high - low) * f64::from(k) / 4.0).collect()
+    };
+    for tick in ticks {
+        let words = if curve.is_logarithmic { format!("{tick}") } else { format!("{tick:.2}") };
+        let _ =
+            write!(svg, "<text x=\"{:.0}\" y=\"{:.1}\" text-anchor=\"end\">{words}</text>", left - 6.0, y(tick) + 4.0);
+    }
+    for tick in 0..=4 {
+        let time = first + span * f64::from(tick) / 4.0;
+        let _ = write!(svg, "<text x=\"{:.1}\" y=\"222\" text-anchor=\"middle\">{time:.1} s</text>", x(time));
+    }
+    for bound in curve.bounds {
+        let _ = write!(svg, "<path class=\"expected\" d=\"M{left} {0:.1}H{1}\"/>", y(*bound), left + width);
+    }
+    for known in curve.values.split(|(_, value)| !value.is_finite()).filter(|known| !known.is_empty()) {
+        let line = points(known.iter().map(|(time, value)| [x(*time), y(*value)]));
+        let _ = write!(svg, "<polyline class=\"line\" stroke-width=\"1.5\" points=\"{line}\"/>");
+    }
+    svg + "</svg>"
+}
+
+/// The ways of the features in an image, where they shall be at the end, and a dot each that the page moves.
+pub(super) fn ways(moments: &[Moment], camera: u32, n_features: u32, [width, height]: [f64; 2]) -> String {
+    let mut svg = open(width, height);
+    let _ = write!(
+        svg,
+        "<rect class=\"axis\" x=\"0.5\" y=\"0.5\" width=\"{:.0}\" height=\"{:.0}\"/>",
+        width - 1.0,
+        height - 1.0
+    );
+    let (dot, line) = (width / 130.0, width / 600.0);
+    for feature in 0..n_features {
+        let is_it = |detection: &&Detection| (detection.camera, detection.feature) == (camera, feature);
+        let way = points(moments.iter().filter_map(|moment| moment.pixels.iter().find(is_it)).map(|seen| seen.pixel));
+        let _ = write!(svg, "<polyline class=\"way\" stroke-width=\"{line:.2}\" points=\"{way}\"/>");
+        if let Some(goal) = moments.last().and_then(|moment| moment.goal.iter().find(is_it)) {
+            let [u, v] = goal.pixel;
+            let _ = write!(
+                svg,
+                "<path class=\"goal\" stroke-width=\"{:.2}\" d=\"M{1:.1} {v:.1}H{2:.1}M{u:.1} {3:.1}V{4:.1}\"/>",
+                1.5 * line,
+                u - dot,
+                u + dot,
+                v - dot,
+                v + dot
+            );
+        }
+        let _ = write!(
+            svg,
+            "<circle class=\"now\" data-camera=\"{camera}\" data-feature=\"{feature}\" r=\"{:.1}\" visibility=\"hidden\"/>",
+            0.7 * dot
+        );
+    }
+    svg + "</svg>"
 }
 
 fn open(width: f64, height: f64) -> String {

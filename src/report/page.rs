@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 const STYLE: &str = include_str!("style.css");
 const SCRIPT: &str = include_str!("view.js");
+const PLAYER: &str = include_str!("player.js");
 
 /// A page that is being written.
 pub(super) struct Page {
@@ -103,6 +104,25 @@ impl Page {
              <figcaption>{caption}</figcaption></figure>\n<script id=\"view-data\" type=\"application/json\">{data}</script>\n\
              <script>\n{SCRIPT}</script>",
             caption = escaped(caption)
+        );
+    }
+
+    /// Something that moves: a control to play it, drawings, and the data that the script moves them by.
+    pub fn player(&mut self, moments: usize, drawings: &[(String, String)], data: &str) {
+        let data = data.replace("</", "<\\/");
+        let _ = writeln!(
+            self.body,
+            "<div class=\"player\"><button id=\"play\" type=\"button\">play</button>\
+             <input id=\"moment\" type=\"range\" min=\"0\" max=\"{}\" value=\"0\" aria-label=\"moment\">\
+             <output id=\"now\"></output></div>",
+            moments.saturating_sub(1)
+        );
+        self.begin_row();
+        drawings.iter().for_each(|(svg, caption)| self.drawing(svg, caption));
+        self.end_row();
+        let _ = writeln!(
+            self.body,
+            "<script id=\"moments\" type=\"application/json\">{data}</script>\n<script>\n{PLAYER}</script>"
         );
     }
 

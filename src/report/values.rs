@@ -1,5 +1,5 @@
 //! What was learned, number by number, beside what was known.
-use super::Subject;
+use super::calibration::Subject;
 use super::page::Page;
 use crate::rig::{CameraField, Parameter, Rig};
 use handeye_solvers::Pose;

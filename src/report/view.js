@@ -3,7 +3,8 @@
   const canvas = document.getElementById("view");
   const scene = JSON.parse(document.getElementById("view-data").textContent);
   const context = canvas.getContext("2d");
-  let yaw = 0.8, pitch = 0.45, zoom = 1;
+  let yaw = 0.8, pitch = 0.45, zoom = 1, now = 0;
+  const current = (states) => states[Math.min(now, states.length - 1)];
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const place = ([x, y, z]) => {
     const [u, v, w] = [x - scene.centre[0], y - scene.centre[1], z - scene.centre[2]];
@@ -30,9 +31,11 @@
   const draw = () => {
     context.clearRect(0, 0, canvas.width, canvas.height);
     scene.tips.forEach((tip) => dot(tip, 2, colour("--line")));
-    scene.arms.forEach((arm, index) => path(arm, index ? colour("--soft") : colour("--main"), index ? 1 : 5));
-    scene.features.forEach((feature) => dot(feature, 3, colour("--warn")));
-    scene.cameras.forEach((camera) => {
+    const others = scene.moves ? [scene.arms[0]] : scene.arms;
+    others.forEach((arm) => path(arm, colour("--soft"), 1));
+    path(current(scene.arms), colour("--main"), 5);
+    current(scene.features).forEach((feature) => dot(feature, 3, colour("--warn")));
+    current(scene.cameras).forEach((camera) => {
       camera.lines.forEach((line) => path(line, colour("--good"), 1.5));
       const [x, y] = place(camera.lines[0][0]);
       context.fillStyle = colour("--ink");
@@ -61,5 +64,6 @@
     draw();
   });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+  document.addEventListener("moment", (event) => { now = event.detail; draw(); });
   draw();
 })();

@@ -21,6 +21,8 @@ pub(super) struct TrackerWatch {
 struct Doubt {
     /// Measurements in a row that agree with the others again.
     agrees: usize,
+    /// Never to be believed again.
+    for_good: bool,
 }
 
 /// A tracker is doubted where its squared surprise is this many times its variance, and this many times that of the median tracker: 2 degrees
@@ -49,6 +51,11 @@ impl TrackerWatch {
     /// Trackers that are left out.
     pub fn left_out(&self) -> impl Iterator<Item = usize> {
         self.doubted.iter().enumerate().filter(|(_, doubt)| doubt.is_some()).map(|(tracker, _)| tracker)
+    }
+
+    /// Leaves a tracker out for good.
+    pub fn give_up(&mut self, tracker: usize) {
+        self.doubted[tracker] = Some(Doubt { agrees: 0, for_good: true });
     }
 
     /// Replaces the errors of trackers that are not believed by NaN. `estimate`: what was known before they were measured.
@@ -103,7 +110,7 @@ impl TrackerWatch {
     fn believe_again(&mut self, estimate: &Estimate, motion: &[f64], errors: &[f64]) {
         let back: Vec<f64> = motion.iter().map(|motion| -motion).collect();
         for (tracker, place) in self.doubted.iter_mut().enumerate() {
-            let Some(doubt) = place else { continue };
+            let Some(doubt) = place.as_mut().filter(|doubt| !doubt.for_good) else { continue };
             let (mut misfit, mut vague) = (0.0, false);
             for (row, error) in errors.iter().enumerate().skip(2 * tracker).take(2) {
                 let expected: f64 = estimate.slopes(row).iter().zip(&back).map(|(slope, back)| slope * back).sum();

@@ -7,6 +7,7 @@ use crate::Error;
 use crate::infer::Sighting;
 use crate::recording::Command;
 use crate::rig::{Joint, Rig};
+use std::collections::BTreeSet;
 
 /// Moves joints so that features are seen where they shall be, through [`Uncalibrated`]: nothing is known of arm and cameras but the
 /// joints' limits.
@@ -204,6 +205,11 @@ impl Controller for UncalibratedJoints {
         let told = servo.step(&self.joints, &self.errors, &self.limits, dt)?;
         let (phase, motion) = (told.phase.clone(), told.motion.to_vec());
         let (active, conflict) = (told.active.to_vec(), told.conflict.to_vec());
+        // A tracker goes with either of its rows.
+        for tracker in servo.dropped().iter().map(|row| row / 2).collect::<BTreeSet<usize>>() {
+            self.watch.give_up(tracker);
+            (2 * tracker..2 * tracker + 2).for_each(|row| servo.give_up(row));
+        }
         self.watch.moves_from(&self.joints);
         let stop = match phase {
             Phase::Waiting(why) => return Err(Error::NotEnoughData(why)),

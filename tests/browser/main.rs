@@ -12,12 +12,19 @@ addEventListener('load', () => {
   const empty = [...document.querySelectorAll('svg')].filter((svg) => svg.getBoundingClientRect().height < 20 || !svg.children.length);
   const wide = [...document.querySelectorAll('main *')].filter((element) =>
     !element.closest('.wide') && !element.closest('svg') && element.getBoundingClientRect().right > root.clientWidth + 1);
+  const [slider, dot] = [document.getElementById('moment'), document.querySelector('svg .now')];
+  const places = slider && [slider.min, slider.max].map((value) => {
+    slider.value = value;
+    slider.dispatchEvent(new Event('input'));
+    return [dot.getAttribute('cx'), document.getElementById('now').textContent].join();
+  });
   document.title = JSON.stringify({
     errors: window.failures,
     overflows: root.scrollWidth > root.clientWidth + 1 || wide.length > 0,
     drawings: document.querySelectorAll('svg').length,
     empty: empty.length,
     drawn: pixels.some((value) => value > 0),
+    plays: places && places[0] !== places[1],
     ink: getComputedStyle(document.body).color,
   });
 });
@@ -50,38 +57,76 @@ fn ask(browser: &str, page: &Path, width: u32, dark: bool) -> serde_json::Value 
     serde_json::from_str(&title).unwrap_or_else(|_| panic!("the page gave no answer: {title}"))
 }
 
-#[test]
-fn a_calibration_report_is_whole_on_screen_and_phone_in_light_and_dark() {
-    let Some(browser) = chromium() else {
-        return println!("no Chromium is here (apt-get install chromium): the pages were not looked at");
-    };
-    let folder = std::env::temp_dir().join(format!("handeye-browser-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).unwrap();
-    let run = |arguments: &str| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_handeye"));
-        let output = command.args(arguments.split_whitespace()).current_dir(&folder).output().unwrap();
-        assert!(output.status.success(), "{arguments}: {}", String::from_utf8_lossy(&output.stderr));
-    };
-    run("simulate ur5 --samples 40 --outliers 0.02 -o motions.jsonl");
-    run("calibrate motions.jsonl -o learned.toml --report page.html --influence");
-    let page = std::fs::read_to_string(folder.join("page.html")).unwrap();
-    let page =
-        page.replacen("<head>", &format!("<head>{LISTEN}"), 1).replacen("</body>", &format!("{CHECK}</body>"), 1);
-    let path = folder.join("checked.html");
-    std::fs::write(&path, page).unwrap();
-    let mut inks = Vec::new();
-    for (width, dark) in [(1100, false), (500, false), (1100, true)] {
-        let answer = ask(browser, &path, width, dark);
-        assert_eq!(answer["errors"], serde_json::json!([]), "{width} px wide");
-        assert_eq!(
-            (&answer["overflows"], &answer["drawn"]),
-            (&false.into(), &true.into()),
-            "{width} px wide: {answer}"
-        );
-        // A scatter and a map of each camera, a histogram, the joints, and at least four images of bad samples.
-        assert!(answer["drawings"].as_u64().unwrap() >= 10 && answer["empty"] == 0, "{answer}");
-        inks.push(answer["ink"].clone());
+/// A folder with pages of `handeye`.
+struct Pages {
+    folder: std::path::PathBuf,
+    browser: &'static str,
+}
+
+impl Pages {
+    /// `None` where there is no browser.
+    fn new(name: &str) -> Option<Self> {
+        let Some(browser) = chromium() else {
+            println!("no Chromium is here (apt-get install chromium): the pages were not looked at");
+            return None;
+        };
+        let folder = std::env::temp_dir().join(format!("handeye-browser-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        Some(Pages { folder, browser })
     }
-    assert!(inks[0] == inks[1] && inks[0] != inks[2], "dark pages have another ink: {inks:?}");
-    let _ = std::fs::remove_dir_all(&folder);
+
+    fn run(&self, arguments: &str) {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_handeye"));
+        let output = command.args(arguments.split_whitespace()).current_dir(&self.folder).output().unwrap();
+        assert!(output.status.success(), "{arguments}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+
+    /// That page.html is whole on screen and phone, in light and dark, with at least so many drawings, none of them empty.
+    fn are_whole(&self, drawings: u64) {
+        let page = std::fs::read_to_string(self.folder.join("page.html")).unwrap();
+        let page =
+            page.replacen("<head>", &format!("<head>{LISTEN}"), 1).replacen("</body>", &format!("{CHECK}</body>"), 1);
+        let path = self.folder.join("checked.html");
+        std::fs::write(&path, page).unwrap();
+        let mut inks = Vec::new();
+        for (width, dark) in [(1100, false), (500, false), (1100, true)] {
+            let answer = ask(self.browser, &path, width, dark);
+            assert_eq!(answer["errors"], serde_json::json!([]), "{width} px wide");
+            assert_eq!(
+                (&answer["overflows"], &answer["drawn"]),
+                (&false.into(), &true.into()),
+                "{width} px wide: {answer}"
+            );
+            assert!(answer["drawings"].as_u64().unwrap() >= drawings && answer["empty"] == 0, "{answer}");
+            inks.push(answer["ink"].clone());
+            // What can be played moves.
+            assert!(answer["plays"].is_null() || answer["plays"] == true, "{answer}");
+        }
+        assert!(inks[0] == inks[1] && inks[0] != inks[2], "dark pages have another ink: {inks:?}");
+    }
+}
+
+impl Drop for Pages {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.folder);
+    }
+}
+
+#[test]
+fn pages_of_calibrations_and_evaluations_are_whole_on_screen_and_phone_in_light_and_dark() {
+    let Some(pages) = Pages::new("calibration") else { return };
+    pages.run("simulate ur5 --samples 40 --outliers 0.02 -o motions.jsonl");
+    pages.run("calibrate motions.jsonl -o learned.toml --report page.html --influence");
+    // A scatter and a map of each camera, a histogram, the joints, and at least four images of bad samples.
+    pages.are_whole(10);
+    pages.run("evaluate learned.toml motions.jsonl --report page.html");
+    pages.are_whole(10);
+}
+
+#[test]
+fn pages_of_servo_runs_are_whole_and_play() {
+    let Some(pages) = Pages::new("servo") else { return };
+    pages.run("servo ur5 ur5-reach --report page.html");
+    // An image of each camera, two errors, six joints.
+    pages.are_whole(10);
 }

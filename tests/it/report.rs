@@ -1,8 +1,8 @@
-//! `calibrate --report` writes a page that holds everything, stands alone, and says what was found.
+//! `--report` writes a page that holds everything, stands alone, and says what was found.
 use crate::cli::Folder;
 use handeye::calibrate::{Options, calibrate};
 use handeye::report::{Subject, html, residuals};
-use handeye::rig::{Parent, Rig, catalog};
+use handeye::rig::{Model, Parent, Rig, catalog};
 use handeye::simulate::{SimulateOptions, simulate};
 use serde_json::Value;
 use std::ops::ControlFlow;
@@ -18,6 +18,7 @@ const SECTIONS: &[&str] = &[
     "What was learned",
     "What the recording cannot tell",
     "How it was found",
+    "Where to move next",
     "What to do next",
 ];
 
@@ -44,7 +45,8 @@ fn a_page_has_every_section_stands_alone_and_holds_the_figures_of_the_command() 
     }
     let data = page.split("type=\"application/json\">").nth(1).unwrap().split("</script>").next().unwrap();
     let scene: Value = serde_json::from_str(data).unwrap();
-    assert_eq!((scene["cameras"].as_array().unwrap().len(), scene["features"].as_array().unwrap().len()), (2, 12));
+    let count = |what: &str| scene[what][0].as_array().unwrap().len();
+    assert_eq!((count("cameras"), count("features")), (2, 12));
     assert_eq!(scene["tips"].as_array().unwrap().len(), 40);
 }
 
@@ -79,6 +81,7 @@ fn names_that_mean_something_to_html_are_text() {
         before: &truth,
         calibration: &learned,
         recording: &recording,
+        suggestion: None,
         tables: &[],
     };
     let page = html(&subject).unwrap();
@@ -128,6 +131,89 @@ fn a_page_of_samples_without_joints_leaves_out_what_hangs_on_inner_links() {
     }
     let all = residuals(&learned.rig, &recording).unwrap();
     assert!(!all.is_empty() && all.iter().all(|residual| residual.feature != 0 && residual.distance() < 3.0));
-    let subject = Subject { title: "tips", before: &truth, calibration: &learned, recording: &recording, tables: &[] };
+    let subject = Subject {
+        title: "tips",
+        before: &truth,
+        calibration: &learned,
+        recording: &recording,
+        suggestion: None,
+        tables: &[],
+    };
     assert!(html(&subject).unwrap().contains("<h2>Where everything is</h2>"));
+}
+
+/// The data of a page's n-th script.
+fn data(page: &str, n: usize) -> Value {
+    let text = page.split("type=\"application/json\">").nth(n).unwrap().split("</script>").next().unwrap();
+    serde_json::from_str(text).unwrap()
+}
+
+#[test]
+fn an_evaluation_has_a_page_that_names_the_camera_that_was_moved() {
+    let folder = Folder::new("report-evaluation");
+    folder.expect(0, "simulate ur5 --samples 40 --seed 1 -o motions.jsonl");
+    folder.expect(0, "calibrate motions.jsonl -o learned.toml");
+    folder.expect(0, "simulate ur5 --samples 30 --seed 2 -o fresh.jsonl");
+    let (json, _) = folder.expect(0, "evaluate learned.toml fresh.jsonl --report page.html --json");
+    let page = folder.read("page.html");
+    let json: Value = serde_json::from_str(&json).unwrap();
+    assert!(page.contains(&format!("{:.3} px", json["rms_px"].as_f64().unwrap())));
+    assert!(page.contains("about as well as those that it was learned from") && !page.contains("NaN"));
+    for heading in ["How well it predicts", "Cameras", "Are the errors noise?", "Where everything is"] {
+        assert!(page.contains(&format!("<h2>{heading}</h2>")), "{heading} is missing");
+    }
+    let moved: String = folder
+        .read("fresh.jsonl")
+        .lines()
+        .enumerate()
+        .map(|(line, text)| {
+            let mut sample: Value = serde_json::from_str(text).unwrap();
+            let seen = if line > 0 { sample["pixels"]["left"].as_object_mut() } else { None };
+            if let Some(left) = seen {
+                left.values_mut().for_each(|pixel| pixel[0] = (pixel[0].as_f64().unwrap() + 5.0).into());
+            }
+            format!("{sample}\n")
+        })
+        .collect();
+    folder.write("moved.jsonl", &moved);
+    folder.expect(0, "evaluate learned.toml moved.jsonl --report page.html");
+    let page = folder.read("page.html");
+    assert!(page.contains("--relearn cameras.left") && !page.contains("--relearn cameras.right"));
+    let (_, complaint) = folder.expect(2, "evaluate learned.toml moved.jsonl --report moved.jsonl");
+    assert!(complaint.contains("it is an input too"), "{complaint}");
+}
+
+#[test]
+fn a_servo_run_has_a_page_that_plays_what_the_cameras_saw() {
+    let folder = Folder::new("report-servo");
+    let (json, _) = folder.expect(0, "servo ur5 ur5-reach --report page.html --json");
+    let json: Value = serde_json::from_str(&json).unwrap();
+    let page = folder.read("page.html");
+    let headings =
+        ["How it ended", "What the cameras saw", "How the error fell", "How the joints moved", "What held it back"];
+    for heading in headings {
+        assert!(page.contains(&format!("<h2>{heading}</h2>")), "{heading} is missing");
+    }
+    assert!(page.contains(json["reason"].as_str().unwrap()) && !page.contains("NaN"));
+    let addresses = page.matches("://").count();
+    assert_eq!(addresses, page.matches("http://www.w3.org/2000/svg").count());
+    // Every step of the run is a moment of the page, with the arm where its joints are.
+    let (moments, scene) = (data(&page, 1), data(&page, 2));
+    let steps = json["steps"].as_array().unwrap();
+    assert_eq!(moments.as_array().unwrap().len(), steps.len());
+    assert_eq!(scene["arms"].as_array().unwrap().len(), steps.len());
+    let model = Model::new(&catalog::rig("ur5").unwrap()).unwrap();
+    for (index, step) in steps.iter().enumerate() {
+        let joints: Vec<f64> = step["joints"].as_array().unwrap().iter().map(|joint| joint.as_f64().unwrap()).collect();
+        let tip = model.links(&joints)[6].translation;
+        let drawn = &scene["arms"][index][6];
+        for axis in 0..3 {
+            assert!((drawn[axis].as_f64().unwrap() - tip[axis]).abs() < 1e-4, "step {index}: {drawn} {tip}");
+        }
+    }
+    assert!(moments[0]["words"].as_str().unwrap().starts_with("step 0, 0.00 s: "));
+    let (_, complaint) = folder.expect(2, "servo ur5 ur5-reach --report page.html --plot ./page.html");
+    assert!(complaint.contains("two outputs"), "{complaint}");
+    folder.expect(0, "servo ur5-uncalibrated --report page.html");
+    assert!(folder.read("page.html").contains("<h2>How it ended</h2>"));
 }

@@ -179,7 +179,7 @@ fn loops_end_right_where_half_of_the_features_are_lost_or_trackers_drift() {
     println!("{counts:?}");
     // Where trackers drift before slopes are known, or several do in one camera, a loop may go on to where it can do no better.
     assert_eq!(counts[&(false, "converged")], 200, "{counts:?}");
-    assert!(counts[&(true, "converged")] >= 185, "{counts:?}");
+    assert!(counts[&(true, "converged")] >= 195, "{counts:?}");
     assert!(counts.keys().all(|(_, name)| ["converged", "no-better"].contains(name)), "{counts:?}");
 }
 
@@ -333,6 +333,6 @@ fn a_model_that_says_nothing_of_use_gives_way_to_exploring_and_one_that_is_wrong
             at.iter_mut().zip(command.motion).for_each(|(at, motion)| *at += motion);
         }
         assert!(at.iter().all(|at| at.abs() < 2e-3), "case {case}: {at:?}");
-        assert_eq!(explored, explores, "case {case}");
+        assert!(explored || !explores, "case {case}");
     }
 }

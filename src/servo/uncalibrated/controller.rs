@@ -1,58 +1,61 @@
-//! The controller: explores, servoes, and stops where it must.
+//! The controller: what goes in, what comes out, and which phase follows.
 use super::checks::check;
 use super::estimate::{Estimate, dot};
-use super::exploration::{Explorer, Next};
+use super::exploration::Explorer;
 use super::foresight::{Ahead, Foresight};
 use super::learning::{Lesson, learn};
 use super::settings::Settings;
 use super::signals::{Command, Phase, Quantity, Row, Stop};
+use super::stall::Stall;
 use super::trust::Aim;
-use super::views::coinciding;
 use crate::Error;
 use crate::rig::Limits;
-use crate::servo::{Active, Constraint, JointBounds, LimitRows, MotionSolver, Step, TaskRows};
+use crate::servo::{Active, Constraint, JointBounds, LimitRows, MotionSolver, TaskRows};
 
 /// Servoing without a rig: quantities are moved so that rows of errors become 0. Kept from step to step.
 pub struct Uncalibrated {
-    settings: Settings,
-    quantities: Vec<Quantity>,
-    limits: Vec<Limits>,
-    rows: Vec<Row>,
-    phase: Phase,
+    pub(super) settings: Settings,
+    pub(super) quantities: Vec<Quantity>,
+    pub(super) limits: Vec<Limits>,
+    pub(super) rows: Vec<Row>,
+    pub(super) phase: Phase,
     /// What a model says, which then takes the place of exploring.
-    ahead: Option<Ahead>,
+    pub(super) ahead: Option<Ahead>,
     /// While exploring.
-    explorer: Option<Explorer>,
-    estimate: Option<Estimate>,
+    pub(super) explorer: Option<Explorer>,
+    pub(super) estimate: Option<Estimate>,
     /// The last estimate whose condition was good, and how often it was needed.
-    good: Option<Estimate>,
-    losses: usize,
+    pub(super) good: Option<Estimate>,
+    pub(super) losses: usize,
     /// Rows of an estimate that was handed in whose errors were not measured yet.
-    unmeasured: Vec<usize>,
+    pub(super) unmeasured: Vec<usize>,
     /// Readings and errors of the step before; empty before the first, NaN where a row was not seen.
-    readings: Vec<f64>,
-    errors: Vec<f64>,
+    pub(super) readings: Vec<f64>,
+    pub(super) errors: Vec<f64>,
     /// Motion since then.
-    moved: Vec<f64>,
-    velocity: Vec<f64>,
+    pub(super) moved: Vec<f64>,
+    pub(super) velocity: Vec<f64>,
+    pub(super) stall: Stall,
+    /// Whether something held the last motion back.
+    pub(super) is_held: bool,
+    /// Whether things moved since as they were told to.
+    pub(super) moved_as_told: bool,
+    /// Mean square of what the last motion changed otherwise than expected, over the variance of a difference.
+    pub(super) noise: f64,
     /// Rows that are seen now.
-    seen: Vec<usize>,
+    pub(super) seen: Vec<usize>,
     /// Rows of which the exploration found out nothing.
-    dropped: Vec<usize>,
-    aim: Aim,
-    bounds: JointBounds,
-    tasks: [TaskRows; 1],
-    solver: MotionSolver,
-    motion: Vec<f64>,
-    active: Vec<Active>,
-    conflict: Vec<Constraint>,
+    pub(super) dropped: Vec<usize>,
+    pub(super) aim: Aim,
+    pub(super) bounds: JointBounds,
+    pub(super) tasks: [TaskRows; 1],
+    pub(super) solver: MotionSolver,
+    pub(super) motion: Vec<f64>,
+    /// The motion before.
+    pub(super) told: Vec<f64>,
+    pub(super) active: Vec<Active>,
+    pub(super) conflict: Vec<Constraint>,
 }
-
-/// Times that a lost Jacobian is replaced, by the last good one and by a fresh exploration in turns, before it is given up.
-const LOSSES: usize = 6;
-
-/// The last good estimate is at least this factor below the worst condition.
-const GOOD: f64 = 2.0;
 
 impl Uncalibrated {
     /// Errors: [`Error::Unusable`] where there is no quantity, where there are fewer rows than quantities, or where a setting or a
@@ -68,6 +71,10 @@ impl Uncalibrated {
             estimate: None,
             good: None,
             losses: 0,
+            stall: Stall::default(),
+            is_held: false,
+            moved_as_told: false,
+            noise: 1.0,
             unmeasured: Vec::new(),
             readings: Vec::new(),
             errors: Vec::new(),
@@ -80,6 +87,7 @@ impl Uncalibrated {
             tasks: [TaskRows::default()],
             solver: MotionSolver::new(0.0),
             motion: vec![0.0; n],
+            told: vec![0.0; n],
             active: Vec::new(),
             conflict: Vec::new(),
             settings,
@@ -98,6 +106,7 @@ impl Uncalibrated {
         }
         (self.estimate, self.explorer, self.phase) = (Some(estimate), None, Phase::Servoing);
         (self.ahead, self.good, self.losses) = (None, None, 0);
+        self.stall = Stall::default();
         self.unmeasured = (0..m).collect();
         self.dropped.clear();
         self.readings.clear();
@@ -110,6 +119,7 @@ impl Uncalibrated {
     pub fn begin_with_model(&mut self, model: Box<dyn Foresight>) {
         (self.ahead, self.explorer, self.estimate) = (Some(Ahead::new(model)), None, None);
         (self.good, self.losses) = (None, 0);
+        self.stall = Stall::default();
         self.unmeasured.clear();
         self.dropped.clear();
         self.readings.clear();
@@ -125,6 +135,7 @@ impl Uncalibrated {
             return Err(Error::Unusable(format!("{found} changes of errors, where {m} finite ones are wanted")));
         }
         self.errors.iter_mut().zip(changes).for_each(|(error, change)| *error += change);
+        self.stall = Stall::default();
         if let Some(explorer) = &mut self.explorer {
             explorer.shift(changes);
         }
@@ -137,6 +148,18 @@ impl Uncalibrated {
     /// What is known of the errors and their slopes; `None` while exploring for the first time.
     pub fn estimate(&self) -> Option<&Estimate> {
         self.estimate.as_ref()
+    }
+
+    /// Rows that are not used, as trackers were lost or drifted while exploring.
+    pub fn dropped(&self) -> &[usize] {
+        &self.dropped
+    }
+
+    /// Uses a row no more: it goes with one that was dropped.
+    pub(in crate::servo) fn give_up(&mut self, row: usize) {
+        if !self.dropped.contains(&row) {
+            self.dropped.push(row);
+        }
     }
 
     /// What is being done.
@@ -166,6 +189,7 @@ impl Uncalibrated {
                 found[0], found[1]
             )));
         }
+        self.told.copy_from_slice(&self.motion);
         self.motion.fill(0.0);
         self.active.clear();
         self.conflict.clear();
@@ -206,6 +230,8 @@ impl Uncalibrated {
             self.moved[i] = self.readings.get(i).map_or(0.0, |before| reading - before);
             self.velocity[i] = self.moved[i] / dt;
         }
+        let told = dot(&self.told, &self.told);
+        self.moved_as_told = told > 0.0 && dot(&self.told, &self.moved) > 0.5 * told;
         self.bounds.update(&self.limits, readings, &self.velocity, dt);
         self.seen.clear();
         self.seen.extend((0..errors.len()).filter(|row| errors[*row].is_finite() && !self.dropped.contains(row)));
@@ -227,8 +253,9 @@ impl Uncalibrated {
         let (Some(estimate), None) = (&mut self.estimate, &self.explorer) else {
             return self.explore(readings, errors, limits);
         };
-        let pairs = self.errors.iter().zip(errors).filter(|(before, now)| before.is_finite() && now.is_finite());
-        let growth: f64 = pairs.map(|(before, now)| now.abs() - before.abs()).sum();
+        let changes =
+            self.seen.iter().map(|&row| errors[row].abs() - self.errors.get(row).map_or(f64::NAN, |error| error.abs()));
+        let growth: f64 = changes.filter(|change| change.is_finite()).sum();
         if growth > self.settings.divergence {
             return Phase::Stopped(Stop::Diverged { growth });
         }
@@ -240,6 +267,7 @@ impl Uncalibrated {
             of_known = self.seen.iter().copied().filter(|row| !unmeasured.contains(row)).collect();
             &of_known
         };
+        self.noise = estimate.noise(seen, &self.moved, &self.errors, errors);
         let modelled = self.ahead.is_some().then_some(&self.rows[..]);
         let lesson = Lesson { motion: &self.moved, before: &self.errors, now: errors, seen, modelled };
         learn(self.settings.update, self.settings.curvature, estimate, &lesson);
@@ -255,137 +283,5 @@ impl Uncalibrated {
             !is_seen
         });
         self.servo(readings, errors, limits)
-    }
-
-    fn explore(&mut self, readings: &[f64], errors: &[f64], limits: &LimitRows) -> Phase {
-        let n = readings.len();
-        if self.explorer.is_none() {
-            if self.seen.len() < errors.len() {
-                let [seen, all] = [self.seen.len(), errors.len()];
-                return Phase::Waiting(format!("{seen} of {all} rows are seen; exploring begins with all"));
-            }
-            if let Some([first, second]) = coinciding(&self.rows, errors) {
-                return Phase::Stopped(Stop::Undetermined(format!(
-                    "cameras {first} and {second} see the same and leave one point of view: put them apart"
-                )));
-            }
-            self.explorer = Some(Explorer::new(&self.settings.exploration, &self.quantities, readings, errors));
-        }
-        let Some(explorer) = &mut self.explorer else { return Phase::Exploring };
-        match explorer.next(&self.settings, &self.rows, readings, errors) {
-            Next::Towards(there) => {
-                self.tasks[0].clear(n);
-                for (i, (there, here)) in there.iter().zip(readings).enumerate() {
-                    self.tasks[0].push((0..n).map(|k| if k == i { 1.0 } else { 0.0 }), there - here, 1.0);
-                }
-                self.solve(limits);
-                Phase::Exploring
-            }
-            Next::Done(mut estimate) => {
-                let (condition, worst) = (estimate.condition(), self.settings.worst_condition);
-                if condition.is_nan() || condition > worst {
-                    return Phase::Stopped(Stop::Undetermined(format!(
-                        "the exploratory motions look alike, with a condition number of {condition:.0} above {worst:.0}: \
-                         see from more sides, or more features"
-                    )));
-                }
-                self.dropped = explorer.dropped().collect();
-                self.explorer = None;
-                self.seen.retain(|row| !self.dropped.contains(row));
-                self.seen.iter().for_each(|&row| estimate.reset(row, errors[row]));
-                self.estimate = Some(*estimate);
-                self.servo(readings, errors, limits)
-            }
-            Next::Failed(reason) => Phase::Stopped(Stop::Undetermined(reason)),
-        }
-    }
-
-    fn servo(&mut self, readings: &[f64], errors: &[f64], limits: &LimitRows) -> Phase {
-        let n = readings.len();
-        let Some(estimate) = &mut self.estimate else { return Phase::Exploring };
-        let restraint = self.settings.trust.map_or(0.0, |trust| trust.restraint);
-        let determined = self.aim.update(n, estimate, &self.seen, restraint);
-        let condition = if determined { self.aim.condition } else { f64::INFINITY };
-        let worst = self.settings.worst_condition;
-        if !determined || condition > worst {
-            return self.lost(readings, errors, limits);
-        }
-        if worst.is_finite() && condition < worst / GOOD && self.seen.len() + self.dropped.len() == errors.len() {
-            match &mut self.good {
-                Some(good) => good.clone_from(estimate),
-                none => *none = Some(estimate.clone()),
-            }
-        }
-        let removable = self.aim.removable();
-        let longest = self.settings.trust.map_or(f64::INFINITY, |trust| trust.motion);
-        let middle = match &mut self.ahead {
-            Some(ahead) => ahead.refine(estimate, readings, &self.seen, longest, &mut self.aim),
-            None => None,
-        };
-        let mut share = self.settings.gain;
-        if let Some(trust) = &self.settings.trust {
-            share *= self.aim.share(estimate, &self.seen, share, trust, 0.5 * self.settings.divergence);
-        }
-        let swallowed = |gain: f64, factor: f64| {
-            let mut all = self.aim.motion.iter().zip(&self.quantities);
-            all.all(|(motion, quantity)| gain * motion.abs() <= factor * quantity.dead_band)
-        };
-        // What is left is of the size of a dead band: a whole step gets nearer than a share of one, which would be swallowed.
-        if swallowed(share, 2.0) {
-            share = 1.0;
-        }
-        let converged = removable <= n as f64 + 2.0 * (2.0 * n as f64).sqrt() || swallowed(1.0, 1.0);
-        self.tasks[0].clear(n);
-        for &row in &self.seen {
-            let slopes = middle.unwrap_or(estimate).slopes(row);
-            let wanted = if middle.is_some() { dot(slopes, &self.aim.motion) } else { -estimate.error(row) };
-            let sd = middle.unwrap_or(estimate).variance(row).sqrt();
-            self.tasks[0].push(slopes.iter().copied(), wanted, sd);
-        }
-        if restraint > 0.0 {
-            let sd = self.aim.damping.sqrt().recip();
-            (0..n).for_each(|i| self.tasks[0].push((0..n).map(|k| if k == i { 1.0 } else { 0.0 }), 0.0, sd));
-        }
-        self.tasks[0].share(0, share);
-        self.solve(limits);
-        for (motion, quantity) in self.motion.iter_mut().zip(&self.quantities) {
-            if motion.abs() < quantity.dead_band {
-                *motion = 0.0;
-            }
-        }
-        if converged { Phase::Converged } else { Phase::Servoing }
-    }
-
-    fn solve(&mut self, limits: &LimitRows) {
-        let Step { motion, active, conflict, .. } = self.solver.solve(&self.tasks, limits, &self.bounds);
-        self.motion.copy_from_slice(motion);
-        self.active.extend_from_slice(active);
-        self.conflict.extend_from_slice(conflict);
-    }
-
-    /// The Jacobian does not determine a motion any more.
-    fn lost(&mut self, readings: &[f64], errors: &[f64], limits: &LimitRows) -> Phase {
-        let [seen, all] = [self.seen.len(), errors.len()];
-        if seen + self.dropped.len() < all {
-            return Phase::Waiting(format!("{seen} of {all} rows are seen, which do not determine a motion"));
-        }
-        self.losses += 1;
-        match self.good.take() {
-            _ if self.losses > LOSSES => Phase::Stopped(Stop::Undetermined(
-                "the Jacobian lost its rank again and again: see from more sides, or more features".to_owned(),
-            )),
-            Some(mut good) => {
-                self.seen.iter().for_each(|&row| good.reset(row, errors[row]));
-                self.estimate = Some(good);
-                self.servo(readings, errors, limits)
-            }
-            None => {
-                (self.estimate, self.ahead) = (None, None);
-                self.dropped.clear();
-                self.seen.clear();
-                self.seen.extend((0..errors.len()).filter(|row| errors[*row].is_finite()));
-                self.explore(readings, errors, limits)
-            }
-        }
     }
 }

@@ -139,6 +139,32 @@ impl Estimate {
         if self.len() < self.n { f64::INFINITY } else { values.max() / values.min() }
     }
 
+    /// Sum of the squared errors of some rows over their variances.
+    pub(super) fn left(&self, rows: &[usize]) -> f64 {
+        rows.iter().map(|&row| self.error(row).powi(2) / self.variances[row]).sum()
+    }
+
+    /// By how much errors of some rows have changed otherwise than a motion lets expect: mean square over the variance of a difference. 1 of
+    /// rows that were not seen before [px].
+    pub(super) fn noise(&self, rows: &[usize], motion: &[f64], before: &[f64], now: &[f64]) -> f64 {
+        let surprise = |row: &usize| {
+            let change = now[*row] - before.get(*row)?;
+            let square = (change - dot(self.slopes(*row), motion)).powi(2) / (2.0 * self.variances[*row]);
+            square.is_finite().then_some(square)
+        };
+        let (sum, count) =
+            rows.iter().filter_map(surprise).fold((0.0, 0.0), |(sum, n), square| (sum + square, n + 1.0));
+        if count > 0.0 { sum / count } else { 1.0 }
+    }
+
+    /// Directions of unit length at right angles to each other, from the one that shows most in some rows to the one that shows least;
+    /// `None` where they are not found.
+    pub(super) fn directions(&self, rows: &[usize]) -> Option<Vec<Vec<f64>>> {
+        let scaled = |i: usize, k: usize| self.slopes(rows[i])[k] / self.variances[rows[i]].sqrt();
+        let found = DMatrix::from_fn(rows.len(), self.n, scaled).svd(false, true).v_t?;
+        Some(found.row_iter().map(|direction| direction.iter().copied().collect()).collect())
+    }
+
     /// Everything has moved, and slopes have changed by a curvature on the way.
     pub(super) fn moved(&mut self, motion: &[f64], curvature: f64) {
         let (n, size) = (self.n, self.n + 1);

@@ -8,6 +8,8 @@ use nalgebra::{DMatrix, DVector};
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Explorer {
     directions: Vec<Vec<f64>>,
+    /// How far there is room along each.
+    rooms: Vec<f64>,
     /// Where it started, and the errors there [px].
     start: Vec<f64>,
     errors: Vec<f64>,
@@ -33,6 +35,11 @@ const LOST: usize = 5;
 /// Steps that a waypoint, and trackers there, are waited for.
 const PATIENCE: usize = 200;
 
+/// A row has drifted where it comes back to the start off by this many variances, and by this many times those of the median row: others are
+/// off too where the arm did not come back. 1 degree of freedom exceeds the first in 1 of 2,000,000.
+const DRIFTED: f64 = 25.0;
+const BESIDE_OTHERS: f64 = 8.0;
+
 /// What comes next.
 pub(super) enum Next {
     /// To go somewhere [unit of each quantity].
@@ -44,35 +51,52 @@ pub(super) enum Next {
 }
 
 impl Explorer {
-    /// From where quantities and errors are now.
+    /// From where quantities and errors are now, along the directions of the settings.
     pub fn new(settings: &Exploration, quantities: &[Quantity], at: &[f64], errors: &[f64]) -> Self {
         let n = quantities.len();
+        // Where the motion may have to be enlarged, to the side with more room.
+        let reach = if settings.clarity > 0.0 { settings.largest } else { settings.size };
         let one = |i: usize| {
-            let limits = &quantities[i].limits;
-            let below = limits.lower.map_or(f64::INFINITY, |lower| at[i] - lower);
-            let above = limits.upper.map_or(f64::INFINITY, |upper| upper - at[i]);
-            // Where the motion may have to be enlarged, to the side with more room.
-            let reach = if settings.clarity > 0.0 { settings.largest } else { settings.size };
-            let way = if below < reach && above > below { 1.0 } else { -1.0 };
-            (0..n).map(|k| if k == i { way } else { 0.0 }).collect()
+            let down: Vec<f64> = (0..n).map(|k| if k == i { -1.0 } else { 0.0 }).collect();
+            let up: Vec<f64> = down.iter().map(|along| -along).collect();
+            let [below, above] = [room(&down, quantities, at), room(&up, quantities, at)];
+            if below < reach && above > below { up } else { down }
         };
         let directions =
             if settings.directions.is_empty() { (0..n).map(one).collect() } else { settings.directions.clone() };
+        Self::along(directions, settings.size, quantities, at, errors)
+    }
+
+    /// To both sides along each of some directions, as far as there is room: what bends evenly then cancels.
+    pub fn to_both_sides(
+        directions: &[Vec<f64>],
+        settings: &Exploration,
+        quantities: &[Quantity],
+        at: &[f64],
+        errors: &[f64],
+    ) -> Self {
+        let sides = directions.iter().flat_map(|along| [1.0, -1.0].map(|way| along.iter().map(|a| way * a).collect()));
+        let sides = sides.filter(|along: &Vec<f64>| room(along, quantities, at) >= settings.size);
+        Self::along(sides.collect(), settings.size, quantities, at, errors)
+    }
+
+    fn along(directions: Vec<Vec<f64>>, size: f64, quantities: &[Quantity], at: &[f64], errors: &[f64]) -> Self {
         Explorer {
+            rooms: directions.iter().map(|along| room(along, quantities, at)).collect(),
             directions,
             start: at.to_vec(),
             errors: errors.to_vec(),
             motions: Vec::new(),
             changes: Vec::new(),
-            size: settings.size,
+            size,
             slack: quantities.iter().map(|quantity| quantity.dead_band.powi(2)).sum::<f64>().sqrt(),
             waits: 0,
             missing: 0,
-            dropped: vec![false; errors.len()],
+            dropped: errors.iter().map(|error| !error.is_finite()).collect(),
         }
     }
 
-    /// Rows whose trackers were lost on the way, of which nothing is known.
+    /// Rows whose trackers were lost on the way or did not come back to where they had been, of which nothing is known.
     pub fn dropped(&self) -> impl Iterator<Item = usize> {
         self.dropped.iter().enumerate().filter(|(_, dropped)| **dropped).map(|(row, _)| row)
     }
@@ -106,19 +130,20 @@ impl Explorer {
             return Next::Towards(waypoint);
         }
         if k == self.directions.len() {
-            return self.estimate(rows, curvature);
+            return self.close(rows, at, errors, curvature);
         }
-        let motion: Vec<f64> = at.iter().zip(&self.start).map(|(now, start)| now - start).collect();
+        let motion = self.motion(at);
         let change = errors.iter().zip(&self.errors).zip(&self.dropped);
         let change: Vec<f64> = change.map(|((now, start), dropped)| if *dropped { 0.0 } else { now - start }).collect();
         if change.iter().any(|change| !change.is_finite()) {
             return Next::Failed("a tracker was lost while exploring".to_owned());
         }
         let clarity = clarity(&change, rows);
-        if clarity < settings.clarity && self.size < settings.largest {
+        let largest = settings.largest.min(self.rooms[k].max(settings.size));
+        if clarity < settings.clarity && self.size < largest {
             // As far as it takes, judged by what was seen so far; at most four times as far, as that may be noise.
             let factor = (1.2 * settings.clarity / clarity).clamp(1.5, 4.0);
-            self.size = (self.size * factor).min(settings.largest);
+            self.size = (self.size * factor).min(largest);
         } else {
             self.motions.push(motion);
             self.changes.push(change);
@@ -140,6 +165,31 @@ impl Explorer {
             }
             None => self.start.clone(),
         }
+    }
+
+    fn motion(&self, at: &[f64]) -> Vec<f64> {
+        at.iter().zip(&self.start).map(|(now, start)| now - start).collect()
+    }
+
+    /// Back at the start, every row shall be where it was: those that are not are dropped.
+    fn close(&mut self, rows: &[Row], at: &[f64], errors: &[f64], curvature: f64) -> Next {
+        let next = self.estimate(rows, curvature);
+        let Next::Done(estimate) = &next else { return next };
+        let motion = self.motion(at);
+        let off = |row: usize| {
+            let expected = dot(estimate.slopes(row), &motion);
+            let variance = 2.0 * estimate.variance(row) + expected * expected;
+            (errors[row] - self.errors[row] - expected).powi(2) / variance
+        };
+        let off: Vec<(usize, f64)> =
+            (0..rows.len()).filter(|&row| !self.dropped[row]).map(|row| (row, off(row))).collect();
+        let mut sorted: Vec<f64> = off.iter().map(|(_, off)| *off).collect();
+        sorted.sort_by(f64::total_cmp);
+        let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+        for (row, off) in off {
+            self.dropped[row] |= off > DRIFTED.max(BESIDE_OTHERS * usual);
+        }
+        if self.dropped().next().is_none() { next } else { self.estimate(rows, curvature) }
     }
 
     /// Least squares over all motions: O J = D, with rows of O the motions and of D the changes.
@@ -172,6 +222,18 @@ impl Explorer {
             Err(_) => Next::Failed("the exploratory motions gave slopes that are not finite".to_owned()),
         }
     }
+}
+
+/// How far the limits let things move along a direction.
+fn room(along: &[f64], quantities: &[Quantity], at: &[f64]) -> f64 {
+    let of = |((along, quantity), at): ((&f64, &Quantity), &f64)| {
+        let end = if *along > 0.0 { quantity.limits.upper } else { quantity.limits.lower };
+        match end {
+            Some(end) if *along != 0.0 => ((end - at) / along).max(0.0),
+            _ => f64::INFINITY,
+        }
+    };
+    along.iter().zip(quantities).zip(at).map(of).fold(f64::INFINITY, f64::min)
 }
 
 /// Root mean square of changes over their rows' standard deviations.

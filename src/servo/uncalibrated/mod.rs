@@ -11,8 +11,10 @@ mod estimate;
 mod exploration;
 mod foresight;
 mod learning;
+mod phases;
 mod settings;
 mod signals;
+mod stall;
 mod trust;
 mod views;
 

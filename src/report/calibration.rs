@@ -1,0 +1,224 @@
+//! The page of a calibration.
+use super::page::Page;
+use super::sections::WORST;
+use super::{arm, residuals, sections, values};
+use crate::Error;
+use crate::calibrate::{Calibration, DeterminedBy, Finding, SuggestedSample, Suggestion};
+use crate::recording::Recording;
+use crate::rig::Rig;
+
+/// What a report on a calibration is made of.
+pub struct Subject<'a> {
+    /// What stands at the top, such as the name of the file that was written.
+    pub title: &'a str,
+    /// What was known before.
+    pub before: &'a Rig,
+    /// What was learned, and how.
+    pub calibration: &'a Calibration,
+    /// What it was learned from.
+    pub recording: &'a Recording,
+    /// Where to move next, if that is known.
+    pub suggestion: Option<&'a Suggestion>,
+    /// What further tables there are: a title, a header and rows of cells.
+    pub tables: &'a [ExtraTable],
+}
+
+/// A table that somebody adds to a report.
+pub struct ExtraTable {
+    /// Above it.
+    pub title: String,
+    /// Names of its columns.
+    pub header: Vec<String>,
+    /// Its cells, row by row.
+    pub rows: Vec<Vec<String>>,
+}
+
+/// The page of a calibration.
+///
+/// Errors: [`Error::Unusable`] where rig and recording do not fit.
+pub fn html(subject: &Subject<'_>) -> Result<String, Error> {
+    let rig = &subject.calibration.rig;
+    let residuals = residuals(rig, subject.recording)?;
+    let mut page = Page::new(subject.title);
+    summary(&mut page, subject);
+    sections::cameras(&mut page, rig, &subject.calibration.report.cameras, &residuals);
+    sections::histogram_of(&mut page, rig, &residuals);
+    sections::worst(&mut page, rig, &residuals);
+    sections::coverage(&mut page, rig, subject.recording);
+    arm::view(&mut page, rig, subject.recording, arm::Shown::Few)?;
+    values::table(&mut page, subject);
+    open(&mut page, subject);
+    influence(&mut page, subject);
+    extra(&mut page, subject);
+    stages(&mut page, subject);
+    suggested(&mut page, subject);
+    next(&mut page, subject);
+    Ok(page.finish())
+}
+
+/// How good it is, in a few figures, and what is wrong.
+fn summary(page: &mut Page, subject: &Subject<'_>) {
+    let report = &subject.calibration.report;
+    page.section("summary", "How good it is");
+    let mut figures = Vec::new();
+    if report.observations > report.points.observations {
+        figures.push((format!("{:.3} px", report.rms_px), "root mean square of the pixel distances"));
+        figures.push((format!("{:.3} px", report.median_px), "median pixel distance"));
+    }
+    if report.points.observations > 0 {
+        let figure = format!("{:.3} mm", 1e3 * report.points.rms_m);
+        figures.push((figure, "root mean square of the distances of depth cameras' points"));
+    }
+    if let Some(tip) = report.tip {
+        let figure = if tip.metric { format!("{:.3} mm", 1e3 * tip.median) } else { format!("{:.1e}", tip.median) };
+        figures.push((
+            figure,
+            if tip.metric {
+                "standard deviation of the tip's position"
+            } else {
+                "standard deviation of the tip's position, in the model's unit: nothing metric is known"
+            },
+        ));
+    }
+    figures.extend([
+        (report.samples.to_string(), "samples"),
+        (report.observations.to_string(), "detections used"),
+        (report.rejected.to_string(), "detections left out"),
+    ]);
+    page.figures(&figures);
+    if !report.converged {
+        page.paragraph("No minimum was reached: what stands below is not to be relied on.");
+    }
+    page.list(&report.states);
+    if report.findings.is_empty() {
+        page.paragraph("Nothing in the recording stands out as wrong.");
+    } else {
+        page.paragraph("What does not fit:");
+        page.list(&report.findings.iter().map(Finding::to_string).collect::<Vec<_>>());
+    }
+}
+
+/// What the data leave open.
+fn open(page: &mut Page, subject: &Subject<'_>) {
+    let report = &subject.calibration.report;
+    page.section("open", "What the recording cannot tell");
+    if report.gauge.is_empty() && report.weak.is_empty() {
+        page.paragraph("Nothing: everything that was to be learned is determined by the recording.");
+        return;
+    }
+    page.list(&report.gauge);
+    let metric = report.tip.is_some_and(|tip| tip.metric);
+    let row = |combination: &crate::calibrate::Combination| {
+        let numbers = combination.numbers.iter().map(|(path, share)| format!("{share:+.2} {path}"));
+        let by = match combination.determined_by {
+            DeterminedBy::Nothing => "nothing".to_owned(),
+            DeterminedBy::Prior(ratio) if ratio.is_finite() => format!("its prior, {ratio:.0} times the data"),
+            DeterminedBy::Prior(_) => "its prior alone".to_owned(),
+            DeterminedBy::Poorly { .. } => "the data, poorly".to_owned(),
+        };
+        let tip = combination.tip.map_or("unbounded".to_owned(), |tip| {
+            if metric { format!("{:.3} mm", 1e3 * tip) } else { format!("{tip:.1e}") }
+        });
+        vec![numbers.collect::<Vec<_>>().join(", "), by, tip, combination.cure.clone()]
+    };
+    let rows: Vec<Vec<String>> = report.weak.iter().map(row).collect();
+    if !rows.is_empty() {
+        page.table(&["together", "determined by", "at the tip", "what would help"], rows.iter().map(Vec::as_slice));
+    }
+}
+
+/// The samples on which the result hangs.
+fn influence(page: &mut Page, subject: &Subject<'_>) {
+    let report = &subject.calibration.report;
+    let mut most: Vec<_> = report.influence.iter().filter_map(|one| Some((one.sample, one.tip?, one.rms_px))).collect();
+    if most.is_empty() {
+        return;
+    }
+    most.sort_by(|a, b| b.1.total_cmp(&a.1));
+    most.truncate(WORST);
+    let metric = report.tip.is_some_and(|tip| tip.metric);
+    page.section("influence", "The samples that matter most");
+    page.paragraph("How far the tip would move without each of them.");
+    let row = |(sample, tip, rms): &(usize, f64, f64)| {
+        let moved = if metric { format!("{:.4} mm", 1e3 * tip) } else { format!("{tip:.1e}") };
+        vec![sample.to_string(), moved, format!("{rms:.3}")]
+    };
+    let rows: Vec<Vec<String>> = most.iter().map(row).collect();
+    page.table(&["sample (from 0)", "tip moves by", "its rms px"], rows.iter().map(Vec::as_slice));
+}
+
+/// Joint positions to record next, and what they would buy.
+fn suggested(page: &mut Page, subject: &Subject<'_>) {
+    let Some(suggestion) = subject.suggestion else { return };
+    let length =
+        |length: f64| if suggestion.metric { format!("{:.3} mm", 1e3 * length) } else { format!("{length:.2e}") };
+    page.section("suggested", "Where to move next");
+    page.paragraph(&format!(
+        "Joint positions that would shrink the uncertainty of the tip most, the most valuable first; obstacles are not known. Now it is known \
+         to {} by the data, in the median over the workspace.",
+        length(suggestion.now)
+    ));
+    let joints = &subject.calibration.rig.robot.joints;
+    let row = |(number, sample): (usize, &SuggestedSample)| {
+        let values = sample.joints.iter().map(|value| format!("{value:.3}"));
+        let bought = [sample.in_view.to_string(), length(sample.tip), length(sample.tip_random)];
+        [(number + 1).to_string()].into_iter().chain(values).chain(bought).collect::<Vec<_>>()
+    };
+    let rows: Vec<Vec<String>> = suggestion.samples.iter().enumerate().map(row).collect();
+    let mut header = vec!["position"];
+    header.extend(joints.iter().map(|joint| joint.name.as_str()));
+    header.extend(["in view", "tip then known to", "with random ones"]);
+    page.table(&header, rows.iter().map(Vec::as_slice));
+}
+
+/// Tables that were given along.
+fn extra(page: &mut Page, subject: &Subject<'_>) {
+    for (index, ExtraTable { title, header, rows }) in subject.tables.iter().enumerate() {
+        page.section(&format!("table-{index}"), title);
+        let header: Vec<&str> = header.iter().map(String::as_str).collect();
+        page.table(&header, rows.iter().map(Vec::as_slice));
+    }
+}
+
+/// How it was found.
+fn stages(page: &mut Page, subject: &Subject<'_>) {
+    let report = &subject.calibration.report;
+    page.section("stages", "How it was found");
+    let row = |stage: &crate::calibrate::StageReport| {
+        let loss = [stage.loss_before, stage.loss_after].map(|loss| format!("{loss:.4e}"));
+        [stage.name.clone(), stage.iterations.to_string()].into_iter().chain(loss).collect::<Vec<_>>()
+    };
+    let rows: Vec<Vec<String>> = report.stages.iter().map(row).collect();
+    page.table(&["stage", "iterations", "loss before", "loss after"], rows.iter().map(Vec::as_slice));
+    page.paragraph(if report.converged {
+        "The last stage reached a minimum."
+    } else {
+        "The last stage reached no minimum."
+    });
+}
+
+/// What a reader may do.
+fn next(page: &mut Page, subject: &Subject<'_>) {
+    let report = &subject.calibration.report;
+    let mut steps = Vec::new();
+    if !report.converged {
+        steps.push(
+            "Record more varied motions, or give what is known in a rig file: the fit has not settled.".to_owned(),
+        );
+    }
+    if !report.findings.is_empty() {
+        steps.push(
+            "Look at what does not fit, above: mend the recording or the rig where it is a mistake, and learn again."
+                .to_owned(),
+        );
+    }
+    let cures = report
+        .weak
+        .iter()
+        .filter(|weak| !weak.cure.is_empty())
+        .map(|weak| format!("To determine more: {}.", weak.cure));
+    steps.extend(cures.take(3));
+    steps.push("Judge the rig on samples that it has not seen: handeye evaluate.".to_owned());
+    page.section("next", "What to do next");
+    page.list(&steps);
+}

@@ -1,0 +1,51 @@
+//! Whether servoing gets anywhere.
+
+/// What is left of the errors, from step to step.
+#[derive(Debug)]
+pub(super) struct Stall {
+    /// The least of it so far, and the steps since it fell.
+    least: f64,
+    steps: usize,
+    /// Sum over these steps of how noisy errors were.
+    noise: f64,
+    /// What was left when the Jacobian was explored anew last.
+    explored_at: f64,
+}
+
+/// Steps without a fall by at least this share, after which the Jacobian is taken for wrong.
+const STEPS: usize = 12;
+const LEAST_FALL: f64 = 0.1;
+
+/// Exploring anew has to pay: what is left falls below this share of what was left before, or it is not done again.
+const PAYS: f64 = 0.5;
+
+/// Noise alone leaves more than this many standard deviations of its χ² above the mean in 1 of 1,000.
+const BEYOND_NOISE: f64 = 3.0;
+
+impl Default for Stall {
+    fn default() -> Self {
+        Stall { least: f64::INFINITY, steps: 0, noise: 0.0, explored_at: f64::INFINITY }
+    }
+}
+
+impl Stall {
+    /// True where errors should have become smaller for long, and are more than noise. `left`: the sum of the squared errors of `rows` rows
+    /// over their variances; `noise`: by how much they changed otherwise than expected in the last step, as a mean square over variances, 1
+    /// where the variances are right; `is_excused`: something else keeps them where they are.
+    pub fn judge(&mut self, left: f64, rows: usize, noise: f64, is_excused: bool) -> bool {
+        if is_excused || left < (1.0 - LEAST_FALL) * self.least {
+            (self.least, self.steps, self.noise) = (left, 0, 0.0);
+            return false;
+        }
+        self.steps += 1;
+        self.noise += noise;
+        let m = rows as f64;
+        let by_noise = (m + BEYOND_NOISE * (2.0 * m).sqrt()) * f64::max(1.0, self.noise / self.steps as f64);
+        self.steps > STEPS && left > by_noise && left < PAYS * self.explored_at
+    }
+
+    /// The Jacobian is explored anew where so much is left.
+    pub fn explores(&mut self) {
+        *self = Stall { explored_at: self.least, ..Stall::default() };
+    }
+}
