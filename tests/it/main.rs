@@ -1,5 +1,6 @@
 //! What users are promised, one file per promise.
 mod bag;
+mod bag_kinds;
 mod calibration;
 mod cli;
 mod cli_calibrate;
