@@ -1,7 +1,8 @@
 //! Reading a rig and the recordings that go with it, and seeing in time that an output can be written.
 use super::answer::remark;
 use handeye::Error;
-use handeye::recording::{Bag, BagOptions, Recording, Sample};
+use handeye::intrinsics::read_intrinsics;
+use handeye::recording::{Opened, RecordedCamera, Recording, Sample};
 use handeye::rig::{Rig, catalog, matches, replace_file};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -27,7 +28,7 @@ pub fn read_rig(argument: &Path) -> Result<RigInput, Error> {
     Ok(RigInput { rig, text, name })
 }
 
-/// Reads recordings as one, ROS 2 bags (.mcap) with default options, and refuses what the rig cannot be the rig of.
+/// Reads recordings as one, bags and tables with default options, and refuses what the rig cannot be the rig of.
 pub fn read_recordings(paths: &[PathBuf], rig: Option<&RigInput>) -> Result<Recording, Error> {
     read_recordings_with_new(paths, rig, &[])
 }
@@ -36,12 +37,8 @@ pub fn read_recordings(paths: &[PathBuf], rig: Option<&RigInput>) -> Result<Reco
 pub fn read_recordings_with_new(paths: &[PathBuf], rig: Option<&RigInput>, new: &[String]) -> Result<Recording, Error> {
     let known_joints: Vec<String> =
         rig.map_or_else(Vec::new, |input| input.rig.robot.joints.iter().map(|joint| joint.name.clone()).collect());
-    let options = BagOptions { known_joints, ..BagOptions::default() };
     let recording = Recording::read_all_with(paths, &mut |path| {
-        if path.extension().is_none_or(|extension| extension != "mcap") {
-            return Recording::read(path);
-        }
-        let Bag { recording, notes } = Bag::read(path, &options)?;
+        let Opened { recording, notes, .. } = Recording::open(path, &known_joints)?;
         notes.iter().for_each(|note| remark(&format!("{}: {note}", path.display())));
         Ok(recording)
     })?;
@@ -77,6 +74,31 @@ fn mismatch(input: &RigInput, recording: &Recording, new: &[String]) -> Option<S
     let would_do =
         if new.is_empty() { String::new() } else { format!("; --relearn cameras.{name_of_it} would add it") };
     Some(format!("camera `{name_of_it}` is not in the rig {name} (known: {known}){would_do}"))
+}
+
+/// What is known of a camera, `left=640x480` or `left=left.yaml`.
+pub fn read_camera(text: &str) -> Result<RecordedCamera, Error> {
+    let Some((name, value)) = text.split_once('=') else {
+        return Err(Error::Unusable(format!("--camera {text}: expected NAME=WIDTHxHEIGHT or NAME=FILE")));
+    };
+    let camera = RecordedCamera { name: name.to_owned(), ..RecordedCamera::default() };
+    let side = |side: &str| side.parse::<u32>().ok().filter(|side| *side > 0);
+    if let Some(size) = value.split_once('x').and_then(|(width, height)| Some([side(width)?, side(height)?])) {
+        return Ok(RecordedCamera { size: Some(size), ..camera });
+    }
+    let path = Path::new(value);
+    let file = std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
+    let read = read_intrinsics(&file, value, None)?;
+    Ok(RecordedCamera {
+        size: read.size,
+        model: Some(read.model),
+        fx: Some(read.focal[0]),
+        fy: Some(read.focal[1]),
+        cx: Some(read.centre[0]),
+        cy: Some(read.centre[1]),
+        distortion: Some(read.distortion).filter(|coefficients| !coefficients.is_empty()),
+        ..camera
+    })
 }
 
 /// True where two paths name one file, which need not exist yet.

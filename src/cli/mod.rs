@@ -46,7 +46,7 @@ Exit status: 0 done; 1 the work could not be done, with the reason; 2 unusable i
 /// Learns one model of a robot arm, its cameras and the features they track from a recording
 ///
 /// The model predicts every pixel from the joints. Nothing needs to be known beforehand; what is known is used. Rigs are
-/// TOML files, recordings JSON Lines or ROS 2 bags (MCAP); metres, radians, seconds, pixels.
+/// TOML files, recordings JSON Lines, ROS 2 bags (MCAP), CSV or LeRobot datasets; metres, radians, seconds, pixels.
 #[derive(Parser)]
 #[command(name = "handeye", version, after_help = EXAMPLES, arg_required_else_help = true, max_term_width = 120)]
 pub struct Cli {

@@ -42,6 +42,7 @@ mod servo_stops;
 mod simulate;
 mod states;
 mod suggest;
+mod tables;
 mod targets;
 mod tidy;
 mod uncalibrated;

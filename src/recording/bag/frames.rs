@@ -1,7 +1,7 @@
 //! The tree of frames that TF describes, and the pose of one frame in another.
 use super::kinds::{frame, need, pose, stamp};
-use super::track::{At, Track};
 use super::value::Value;
+use crate::recording::track::{At, Track};
 use handeye_solvers::Pose;
 use std::collections::BTreeMap;
 

@@ -1,16 +1,16 @@
 //! The first pass over a bag: what images show, and what is said of cameras.
-use super::BagOptions;
 use super::cameras::Info;
-use super::kinds::{Kind, features, frame, stamp};
+use super::kinds::{Kind, features, frame, need, stamp};
 use super::messages::{Channel, Visitor};
 use super::topics::{Topic, is_topic};
+use super::{BagOptions, Detect};
 use crate::Error;
 use crate::recording::names::Names;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 /// What one message says of one image.
-pub(super) struct Image {
+pub(in crate::recording) struct Image {
     /// [ns]
     pub stamp: i64,
     /// Index of its source.
@@ -21,6 +21,16 @@ pub(super) struct Image {
 
 /// A topic (by index) and a frame: images of one camera.
 pub(super) type Source = (usize, String);
+
+/// A PNG or JPEG, and where it belongs.
+struct Pending {
+    stamp: i64,
+    source: usize,
+    bytes: Vec<u8>,
+}
+
+/// Images that are looked at together, so that several cores have work and memory stays bounded.
+const TOGETHER: usize = 32;
 
 /// What the first pass finds.
 pub(super) struct Images<'a> {
@@ -33,10 +43,15 @@ pub(super) struct Images<'a> {
     pub infos: BTreeMap<Source, Info>,
     /// Pixels that are no numbers.
     pub not_finite: usize,
+    /// Looks for features in images; where it is not given, those of detectors' messages are taken.
+    detect: Option<&'a mut Detect<'a>>,
+    pending: Vec<Pending>,
+    /// Images that cannot be decoded, and why not the first.
+    undecoded: (usize, String),
 }
 
 impl<'a> Images<'a> {
-    pub(super) fn new(path: &'a Path, options: &'a BagOptions) -> Self {
+    pub(super) fn new(path: &'a Path, options: &'a BagOptions, detect: Option<&'a mut Detect<'a>>) -> Self {
         Images {
             path,
             options,
@@ -46,6 +61,37 @@ impl<'a> Images<'a> {
             sources: Vec::new(),
             infos: BTreeMap::new(),
             not_finite: 0,
+            detect,
+            pending: Vec::new(),
+            undecoded: (0, String::new()),
+        }
+    }
+
+    /// Looks at the images that wait, and says how many could not be looked at so far.
+    pub(super) fn finish(&mut self) -> Option<String> {
+        self.look();
+        let (count, why) = &self.undecoded;
+        (*count > 0).then(|| format!("{count} images are left out, the first of which {why}"))
+    }
+
+    fn look(&mut self) {
+        let Some(detect) = &mut self.detect else { return };
+        let pending = std::mem::take(&mut self.pending);
+        let bytes: Vec<&[u8]> = pending.iter().map(|image| image.bytes.as_slice()).collect();
+        let found = detect(&bytes);
+        for (Pending { stamp, source, .. }, found) in pending.iter().zip(found) {
+            match found {
+                Ok(seen) => {
+                    let features = seen.iter().map(|(name, pixel)| (self.features.intern(name), *pixel)).collect();
+                    self.images.push(Image { stamp: *stamp, source: *source, features });
+                }
+                Err(why) => {
+                    if self.undecoded.0 == 0 {
+                        self.undecoded.1 = why;
+                    }
+                    self.undecoded.0 += 1;
+                }
+            }
         }
     }
 
@@ -73,7 +119,17 @@ impl Visitor for Images<'_> {
         self.topics[channel].messages += 1;
         let topic = &self.topics[channel];
         match topic.kind {
-            Some(kind) if kind.is_of_images() && self.is_meant(&topic.name) => {
+            Some(Kind::CompressedImage) if self.detect.is_some() && self.is_meant(&topic.name) => {
+                let (stamp, frame, bytes) = topic.decode(self.path, time, data, |message| {
+                    Ok((stamp(message)?, frame(message).to_owned(), need(message.bytes("data"), "data")?.to_vec()))
+                })?;
+                let source = self.source(channel, &frame);
+                self.pending.push(Pending { stamp, source, bytes });
+                if self.pending.len() >= TOGETHER {
+                    self.look();
+                }
+            }
+            Some(kind) if kind.is_of_images() && self.detect.is_none() && self.is_meant(&topic.name) => {
                 let (stamp, frame, seen) = topic.decode(self.path, time, data, |message| {
                     Ok((stamp(message)?, frame(message).to_owned(), features(kind, message)?))
                 })?;

@@ -15,6 +15,8 @@ pub(super) enum Kind {
     Detections,
     Pose,
     Transforms,
+    /// PNG or JPEG.
+    CompressedImage,
 }
 
 impl Kind {
@@ -28,6 +30,7 @@ impl Kind {
             ("vision_msgs", "Detection2DArray") => Some(Kind::Detections),
             ("geometry_msgs", "PoseStamped") => Some(Kind::Pose),
             ("tf2_msgs", "TFMessage") => Some(Kind::Transforms),
+            ("sensor_msgs", "CompressedImage") => Some(Kind::CompressedImage),
             _ => None,
         }
     }
@@ -57,6 +60,7 @@ impl Kind {
             Kind::Detections => &["header", "detections.id", "detections.results", "detections.bbox.center"],
             Kind::Pose => &["header.stamp", "pose"],
             Kind::Transforms => &["transforms"],
+            Kind::CompressedImage => &["header", "data"],
         }
     }
 }

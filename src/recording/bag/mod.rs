@@ -11,19 +11,20 @@ mod samples;
 mod schema;
 mod states;
 mod topics;
-mod track;
 mod value;
 
+use super::names::Names;
+use super::track::At;
 use super::{Detection, Recording, Sample};
 use crate::Error;
 use handeye_solvers::Pose;
+pub(super) use images::Image;
 use images::{Images, tidy};
 use kinds::Kind;
-use samples::Group;
+pub(super) use samples::{Group, groups};
 use states::States;
 use std::path::Path;
 use topics::choose;
-use track::At;
 
 /// What of a bag is meant, where its types alone do not tell.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -53,6 +54,9 @@ pub struct Bag {
     pub notes: Vec<String>,
 }
 
+/// Looks for features in PNG or JPEG images: of each their names and pixels, or why it cannot be looked at, in words.
+pub type Detect<'a> = dyn FnMut(&[&[u8]]) -> Vec<Result<Vec<(String, [f64; 2])>, String>> + 'a;
+
 impl Bag {
     /// Reads an MCAP file.
     ///
@@ -62,85 +66,98 @@ impl Bag {
     /// Errors: [`Error::Io`], and [`Error::Unusable`] with file and topic for messages that do not fit their schema, topics that are
     /// missing or more than one, and a file without images.
     pub fn read(path: &Path, options: &BagOptions) -> Result<Bag, Error> {
-        let mut images = Images::new(path, options);
-        let problem = messages::visit(path, &mut images)?;
-        let mut notes: Vec<String> = problem.into_iter().collect();
-        let (cameras, camera_of_source) = cameras::cameras(&images.sources, &images.infos, &images.topics, options);
-        let within = options.join.map(|seconds| (seconds * 1e9) as i64);
-        let groups = samples::groups(&images.images, &camera_of_source, within);
-        if groups.is_empty() {
-            let cut_off = notes.first().map_or_else(String::new, |note| format!(", and it {note}"));
-            return Err(Error::Unusable(format!(
-                "{}: has no image with features (apriltag_msgs/AprilTagDetectionArray or vision_msgs/Detection2DArray{}); it has {}{cut_off}",
-                path.display(),
-                if options.camera_topics.is_empty() { "" } else { ", on the topics that were named" },
-                topics::list(&images.topics)
-            )));
+        read(path, options, None)
+    }
+
+    /// The same with the features that are found in its compressed images (sensor_msgs/CompressedImage), in place of those that it holds.
+    /// Images that cannot be looked at are left out, which is said.
+    pub fn detect<'a>(path: &'a Path, options: &'a BagOptions, detect: &'a mut Detect<'a>) -> Result<Bag, Error> {
+        read(path, options, Some(detect))
+    }
+}
+
+fn read<'a>(path: &'a Path, options: &'a BagOptions, detect: Option<&'a mut Detect<'a>>) -> Result<Bag, Error> {
+    let wanted = match detect {
+        Some(_) => "compressed image (sensor_msgs/CompressedImage) that shows what is looked for",
+        None => "image with features (apriltag_msgs/AprilTagDetectionArray or vision_msgs/Detection2DArray)",
+    };
+    let mut images = Images::new(path, options, detect);
+    let problem = messages::visit(path, &mut images)?;
+    let mut notes: Vec<String> = problem.into_iter().chain(images.finish()).collect();
+    let (cameras, camera_of_source) = cameras::cameras(&images.sources, &images.infos, &images.topics, options);
+    let within = options.join.map(|seconds| (seconds * 1e9) as i64);
+    let groups = groups(&images.images, &camera_of_source, within);
+    if groups.is_empty() {
+        let cut_off = notes.first().map_or_else(String::new, |note| format!(", and it {note}"));
+        return Err(Error::Unusable(format!(
+            "{}: has no {wanted}{}; it has {}{cut_off}",
+            path.display(),
+            if options.camera_topics.is_empty() { "" } else { ", on the topics that were named" },
+            topics::list(&images.topics)
+        )));
+    }
+    let topics = &images.topics;
+    let joint_topic = choose(topics, Kind::JointStates, options.joint_topic.as_deref(), "--joint-topic", path)?;
+    let pose_topic = match &options.pose_topic {
+        None if joint_topic.is_some() || options.frames.is_some() => None,
+        named => choose(topics, Kind::Pose, named.as_deref(), "--pose-topic", path)?,
+    };
+    let moments: Vec<i64> = groups.iter().map(|group| group.time).collect();
+    let mut states = States::new(path, options, &moments, [joint_topic, pose_topic]);
+    if joint_topic.is_some() || pose_topic.is_some() || options.frames.is_some() {
+        messages::visit(path, &mut states)?;
+    }
+    let poses = match &options.frames {
+        Some([base, tip]) => states
+            .frames
+            .poses(&moments, base.trim_start_matches('/'), tip.trim_start_matches('/'))
+            .map_err(|problem| Error::Unusable(format!("{}: {problem}", path.display())))?,
+        None => states.poses.at(&moments),
+    };
+    let joints = states.joints.at(&moments);
+    notes.extend(note_on_groups(&groups));
+    if joint_topic.is_some() {
+        notes.extend(note_on_states("joint states", &joints, states.joints.span(), &moments));
+    }
+    if pose_topic.is_some() || options.frames.is_some() {
+        notes.extend(note_on_states("tip poses", &poses, states.poses.span(), &moments));
+    }
+    for (number, what) in [
+        (states.skipped, "joint states lack a joint or a position, and are left out"),
+        (images.not_finite, "detections are no numbers, and are left out"),
+    ] {
+        if number > 0 {
+            notes.push(format!("{number} {what}"));
         }
-        let topics = &images.topics;
-        let joint_topic = choose(topics, Kind::JointStates, options.joint_topic.as_deref(), "--joint-topic", path)?;
-        let pose_topic = match &options.pose_topic {
-            None if joint_topic.is_some() || options.frames.is_some() => None,
-            named => choose(topics, Kind::Pose, named.as_deref(), "--pose-topic", path)?,
-        };
-        let moments: Vec<i64> = groups.iter().map(|group| group.time).collect();
-        let mut states = States::new(path, options, &moments, [joint_topic, pose_topic]);
-        if joint_topic.is_some() || pose_topic.is_some() || options.frames.is_some() {
-            messages::visit(path, &mut states)?;
-        }
-        let poses = match &options.frames {
-            Some([base, tip]) => states
-                .frames
-                .poses(&moments, base.trim_start_matches('/'), tip.trim_start_matches('/'))
-                .map_err(|problem| Error::Unusable(format!("{}: {problem}", path.display())))?,
-            None => states.poses.at(&moments),
-        };
-        let joints = states.joints.at(&moments);
-        notes.extend(note_on_groups(&groups));
-        if joint_topic.is_some() {
-            notes.extend(note_on_states("joint states", &joints, states.joints.span(), &moments));
-        }
-        if pose_topic.is_some() || options.frames.is_some() {
-            notes.extend(note_on_states("tip poses", &poses, states.poses.span(), &moments));
-        }
-        for (number, what) in [
-            (states.skipped, "joint states lack a joint or a position, and are left out"),
-            (images.not_finite, "detections are no numbers, and are left out"),
-        ] {
-            if number > 0 {
-                notes.push(format!("{number} {what}"));
-            }
-        }
-        let names = std::mem::take(&mut states.names);
-        if options.joints.is_empty() && !names.is_empty() && names != options.known_joints {
-            let order = names.join(", ");
-            notes.push(format!(
+    }
+    let names = std::mem::take(&mut states.names);
+    if options.joints.is_empty() && !names.is_empty() && names != options.known_joints {
+        let order = names.join(", ");
+        notes.push(format!(
                 "joints are in the order of the first joint state: {order}; where that is not from base to tip, give a rig with these names or \
                  `handeye convert --joints`"
             ));
-        }
-        let states = joints.into_iter().zip(poses);
-        let states = states.map(|(joints, pose)| (joints.map(|at| at.value), pose.map(|at| at.value)));
-        let (samples, features, twice) = assemble(&groups, images, &camera_of_source, states);
-        if twice > 0 {
-            notes
-                .push(format!("{twice} detections are of a feature that the same image has already, and are left out"));
-        }
-        let joints = names.iter().map(|name| tidy(name)).collect();
-        Ok(Bag { recording: Recording { joints, cameras, features, samples }, notes })
     }
+    let states = joints.into_iter().zip(poses);
+    let states = states.map(|(joints, pose)| (joints.map(|at| at.value), pose.map(|at| at.value)));
+    let (samples, features, twice) = assemble(&groups, &images.images, images.features, &camera_of_source, states);
+    if twice > 0 {
+        notes.push(format!("{twice} detections are of a feature that the same image has already, and are left out"));
+    }
+    let joints = names.iter().map(|name| tidy(name)).collect();
+    Ok(Bag { recording: Recording { joints, cameras, features, samples }, notes })
 }
 
 /// The samples, the features that they count by, and how many detections of a feature that its image had already were left out.
 /// `states`: joints and tip pose of each group.
-fn assemble(
+pub(super) fn assemble(
     groups: &[Group],
-    images: Images,
+    images: &[Image],
+    features: Names,
     camera_of_source: &[u32],
     states: impl Iterator<Item = (Option<Vec<f64>>, Option<Pose>)>,
 ) -> (Vec<Sample>, Vec<String>, usize) {
-    let (features, places) = images.features.in_natural_order();
-    let images = images.images;
+    let (features, places) = features.in_natural_order();
     let detections = |&index: &usize| {
         let image = &images[index];
         let camera = camera_of_source[image.source];

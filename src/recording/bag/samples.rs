@@ -2,7 +2,7 @@
 use super::images::Image;
 
 /// Images that make a sample.
-pub(super) struct Group {
+pub(in crate::recording) struct Group {
     /// The mean of their stamps [ns].
     pub time: i64,
     /// Indices, ordered by stamp.
@@ -14,7 +14,7 @@ pub(super) struct Group {
 /// Groups images whose stamps are `within` [ns] of the first of them, each of another camera or of exactly its stamp.
 ///
 /// `within`: half the shortest usual time between two images of one camera where it is not given.
-pub(super) fn groups(images: &[Image], camera: &[u32], within: Option<i64>) -> Vec<Group> {
+pub(in crate::recording) fn groups(images: &[Image], camera: &[u32], within: Option<i64>) -> Vec<Group> {
     let mut order: Vec<usize> = (0..images.len()).filter(|&index| !images[index].features.is_empty()).collect();
     order.sort_by_key(|&index| images[index].stamp);
     let within = within.unwrap_or_else(|| usual_period(images, camera, &order) / 2);

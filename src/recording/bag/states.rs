@@ -4,9 +4,9 @@ use super::frames::Frames;
 use super::kinds::{Kind, need, pose, stamp};
 use super::messages::{Channel, Visitor};
 use super::topics::Topic;
-use super::track::Track;
 use super::value::Value;
 use crate::Error;
+use crate::recording::track::Track;
 use handeye_solvers::Pose;
 use std::path::Path;
 

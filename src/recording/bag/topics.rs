@@ -52,9 +52,11 @@ impl Topic {
         })
     }
 
-    /// Its name without the last part, `/left/tags` -> `left`; empty where it has no other.
+    /// Its name without the last part, `/left/tags` and `/left/image_raw/compressed` -> `left`; empty where it has no other.
     pub(super) fn namespace(&self) -> &str {
-        self.name.trim_start_matches('/').rsplit_once('/').map_or("", |(namespace, _)| namespace)
+        let name = self.name.trim_start_matches('/');
+        let image = name.strip_suffix("/compressed").unwrap_or(name);
+        image.rsplit_once('/').map_or("", |(namespace, _)| namespace)
     }
 }
 

@@ -9,6 +9,7 @@ pub(super) enum Value<'a> {
     Number(f64),
     Text(&'a str),
     Numbers(Vec<f64>),
+    Bytes(&'a [u8]),
     List(Vec<Value<'a>>),
     Message(Vec<(&'a str, Value<'a>)>),
 }
@@ -49,6 +50,10 @@ impl<'a> Value<'a> {
         if let Some(Value::Numbers(numbers)) = self.at(path) { Some(numbers) } else { None }
     }
 
+    pub(super) fn bytes(&self, path: &str) -> Option<&'a [u8]> {
+        if let Some(Value::Bytes(bytes)) = self.at(path) { Some(bytes) } else { None }
+    }
+
     pub(super) fn list(&self, path: &str) -> Option<&[Value<'a>]> {
         if let Some(Value::List(list)) = self.at(path) { Some(list) } else { None }
     }
@@ -61,6 +66,7 @@ fn value<'a, BO: CdrEndian>(layout: &'a Layout, reader: &mut CdrReader<'a, BO>) 
         Layout::Array { element, length } => {
             let count = count(*length, reader)?;
             match element.as_ref() {
+                Layout::Builtin(BuiltInType::UInt8 | BuiltInType::Byte) => Ok(Value::Bytes(reader.read_bytes(count)?)),
                 Layout::Builtin(BuiltInType::Float64) => Ok(Value::Numbers(reader.read_numeric_vec::<f64>(count)?)),
                 Layout::Builtin(kind) if !matches!(kind, BuiltInType::String(_) | BuiltInType::WString(_)) => {
                     Ok(Value::Numbers((0..count).map(|_| number(kind, reader)).collect::<re_cdr::Result<_>>()?))

@@ -3,7 +3,7 @@ use handeye_solvers::Pose;
 use handeye_solvers::manifold::so3;
 
 /// What can be interpolated.
-pub(super) trait Between {
+pub(in crate::recording) trait Between {
     /// `weight`: 0 at `self`, 1 at `other`.
     fn between(&self, other: &Self, weight: f64) -> Self;
 }
@@ -29,26 +29,26 @@ impl Between for Pose {
 ///
 /// Moment i and its predecessor enclose gap i, which ends with moment i itself; the first and the last measurement in each are kept.
 #[derive(Debug)]
-pub(super) struct Track<T> {
+pub(in crate::recording) struct Track<T> {
     gaps: Vec<Option<[(i64, T); 2]>>,
     span: Option<[i64; 2]>,
 }
 
 /// A value at a moment, and how far apart the two are that it lies between [ns].
 #[derive(Debug)]
-pub(super) struct At<T> {
+pub(in crate::recording) struct At<T> {
     pub value: T,
     pub gap: i64,
 }
 
 impl<T: Clone + Between> Track<T> {
     /// For a number of moments.
-    pub(super) fn new(moments: usize) -> Self {
+    pub(in crate::recording) fn new(moments: usize) -> Self {
         Track { gaps: vec![None; moments + 1], span: None }
     }
 
     /// Takes a measurement, in any order; `moments` [ns] are sorted. Of two at the same time the first counts.
-    pub(super) fn add(&mut self, moments: &[i64], time: i64, value: T) {
+    pub(in crate::recording) fn add(&mut self, moments: &[i64], time: i64, value: T) {
         let [first, last] = self.span.unwrap_or([time; 2]);
         self.span = Some([first.min(time), last.max(time)]);
         let gap = &mut self.gaps[moments.partition_point(|moment| *moment < time)];
@@ -61,12 +61,12 @@ impl<T: Clone + Between> Track<T> {
     }
 
     /// First and last time of a measurement [ns].
-    pub(super) fn span(&self) -> Option<[i64; 2]> {
+    pub(in crate::recording) fn span(&self) -> Option<[i64; 2]> {
         self.span
     }
 
     /// The values at all moments; `None` before the first measurement and after the last.
-    pub(super) fn at(&self, moments: &[i64]) -> Vec<Option<At<T>>> {
+    pub(in crate::recording) fn at(&self, moments: &[i64]) -> Vec<Option<At<T>>> {
         // The next measurement after each gap.
         let mut next: Vec<Option<&(i64, T)>> = vec![None; moments.len() + 1];
         for index in (0..moments.len()).rev() {

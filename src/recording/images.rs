@@ -1,0 +1,173 @@
+//! What images show, with where the robot was at the time.
+use super::bag::{Group, Image, assemble, groups};
+use super::names::Names;
+use super::track::{At, Track};
+use super::{RecordedCamera, Recording, Sample};
+use handeye_solvers::Pose;
+use std::collections::BTreeMap;
+
+/// What one image shows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImageSeen {
+    /// Index of its camera.
+    pub camera: u32,
+    /// The name of its file, without folder and ending: images of several cameras with one name belong together.
+    pub name: String,
+    /// When it was taken [s].
+    pub time: Option<f64>,
+    /// Names and pixels of features.
+    pub features: Vec<(String, [f64; 2])>,
+}
+
+/// How images find the rows of a recording that says where the robot was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pairing {
+    /// The first names with the first row: there are as many rows as names.
+    Order,
+    /// By the name that each row has.
+    Name,
+    /// By time, interpolated between rows.
+    Time,
+}
+
+impl Recording {
+    /// Joins images with the joints, poses and actions of `states`, whose other content is left out; `names`: of its rows, for
+    /// [`Pairing::Name`].
+    ///
+    /// Images that show nothing are left out, with their rows. By [`Pairing::Time`] images of several cameras make one sample where their times
+    /// are within half the time between two images of one camera; otherwise where they have one name. Without states, samples are in the order
+    /// of `images`, whose names come in their order.
+    ///
+    /// Returned are the recording and notes. Errors: what does not fit, in words.
+    pub fn from_images(
+        cameras: Vec<RecordedCamera>,
+        images: &[ImageSeen],
+        states: Option<(&Recording, &[String], Pairing)>,
+    ) -> Result<(Recording, Vec<String>), String> {
+        let by_time = matches!(states, Some((_, _, Pairing::Time)));
+        let mut order: Vec<&str> = Vec::new();
+        let mut places: BTreeMap<&str, i64> = BTreeMap::new();
+        for image in images {
+            places.entry(image.name.as_str()).or_insert_with(|| {
+                order.push(&image.name);
+                order.len() as i64 - 1
+            });
+        }
+        let mut features = Names::default();
+        let mut stamped = Vec::with_capacity(images.len());
+        for image in images {
+            let stamp = match (by_time, image.time) {
+                (false, _) => places[image.name.as_str()],
+                (true, Some(time)) => (time * 1e9) as i64,
+                (true, None) => return Err(format!("the name of image `{}` is no time", image.name)),
+            };
+            let features = image.features.iter().map(|(name, pixel)| (features.intern(name), *pixel)).collect();
+            stamped.push(Image { stamp, source: image.camera as usize, features });
+        }
+        let camera_of_source: Vec<u32> = (0..cameras.len() as u32).collect();
+        let groups = groups(&stamped, &camera_of_source, (!by_time).then_some(0));
+        let mut notes = Vec::new();
+        let blank = images.iter().filter(|image| image.features.is_empty()).count();
+        if blank > 0 {
+            notes.push(format!("{blank} of {} images show nothing of what is looked for", images.len()));
+        }
+        let rows = match states {
+            None => groups.iter().map(|_| Sample::default()).collect(),
+            Some((states, _, Pairing::Order)) => in_order(&groups, order.len(), states)?,
+            Some((states, names, Pairing::Name)) => by_name(&groups, &order, states, names)?,
+            Some((states, _, Pairing::Time)) => at_times(&groups, states, &mut notes)?,
+        };
+        let empty = rows.iter().map(|_| (None, None));
+        let (mut samples, features, _) = assemble(&groups, &stamped, features, &camera_of_source, empty);
+        for (sample, row) in samples.iter_mut().zip(rows) {
+            let time = if by_time { sample.time } else { row.time };
+            let (pixels, points, targets) = (std::mem::take(&mut sample.pixels), Vec::new(), Vec::new());
+            *sample = Sample { time, pixels, points, targets, ..row };
+        }
+        let joints = states.map_or_else(Vec::new, |(states, _, _)| states.joints.clone());
+        Ok((Recording { joints, cameras, features, samples }, notes))
+    }
+}
+
+/// The rows of names that are counted by stamps.
+fn in_order(groups: &[Group], names: usize, states: &Recording) -> Result<Vec<Sample>, String> {
+    let rows = states.samples.len();
+    if rows != names {
+        return Err(format!(
+            "there are {names} images of each camera and {rows} rows, which do not pair in order (by name or time they might)"
+        ));
+    }
+    Ok(groups.iter().map(|group| unless_skipped(groups, group, states)).collect())
+}
+
+/// The row of a group; what is commanded in it leads to the next row, which has to be there.
+fn unless_skipped(groups: &[Group], group: &Group, states: &Recording) -> Sample {
+    let mut row = states.samples[group.time as usize].clone();
+    if !groups.iter().any(|next| next.time == group.time + 1) {
+        (row.joint_action, row.pose_action) = (None, None);
+    }
+    row
+}
+
+fn by_name(groups: &[Group], order: &[&str], states: &Recording, names: &[String]) -> Result<Vec<Sample>, String> {
+    if names.len() != states.samples.len() {
+        return Err("the rows have no names of images (a column `image`)".to_owned());
+    }
+    let mut rows = BTreeMap::new();
+    for (row, name) in names.iter().enumerate() {
+        if !name.is_empty() && rows.insert(name.as_str(), row).is_some() {
+            return Err(format!("two rows are of the image `{name}`"));
+        }
+    }
+    let row = |group: &Group| {
+        let name = order[group.time as usize];
+        let row = rows.get(name).ok_or_else(|| format!("no row is of the image `{name}`"))?;
+        let mut row = states.samples[*row].clone();
+        (row.joint_action, row.pose_action) = (None, None);
+        Ok(row)
+    };
+    groups.iter().map(row).collect()
+}
+
+/// Joints and poses at the times of the images, interpolated.
+fn at_times(groups: &[Group], states: &Recording, notes: &mut Vec<String>) -> Result<Vec<Sample>, String> {
+    let moments: Vec<i64> = groups.iter().map(|group| group.time).collect();
+    let mut joints: Track<Vec<f64>> = Track::new(moments.len());
+    let mut poses: Track<Pose> = Track::new(moments.len());
+    for sample in &states.samples {
+        let Some(time) = sample.time else { continue };
+        let time = (time * 1e9) as i64;
+        if let Some(read) = &sample.joints {
+            joints.add(&moments, time, read.clone());
+        }
+        if let Some(pose) = sample.pose {
+            poses.add(&moments, time, pose);
+        }
+    }
+    let (joints, poses) = (joints.at(&moments), poses.at(&moments));
+    let gap = |gaps: Vec<Option<i64>>| gaps.into_iter().flatten().max().unwrap_or(0);
+    let largest = gap(joints.iter().map(|at| at.as_ref().map(|at| at.gap)).collect())
+        .max(gap(poses.iter().map(|at| at.as_ref().map(|at| at.gap)).collect()));
+    let outside = joints.iter().zip(&poses).filter(|(joints, pose)| joints.is_none() && pose.is_none()).count();
+    if outside == groups.len() {
+        let first = |times: &mut dyn Iterator<Item = f64>| times.next().unwrap_or(f64::NAN);
+        return Err(format!(
+            "no image was taken while the robot was recorded: images begin at {} s, rows at {} s",
+            first(&mut moments.iter().map(|moment| *moment as f64 / 1e9)),
+            first(&mut states.samples.iter().filter_map(|sample| sample.time))
+        ));
+    }
+    if outside > 0 {
+        notes
+            .push(format!("{outside} of {} samples are outside of the time that the robot was recorded", groups.len()));
+    }
+    if largest > 0 {
+        notes.push(format!("states are interpolated, between two that are up to {:.6} s apart", largest as f64 / 1e9));
+    }
+    let row = |(joints, pose): (Option<At<Vec<f64>>>, Option<At<Pose>>)| Sample {
+        joints: joints.map(|at| at.value),
+        pose: pose.map(|at| at.value),
+        ..Sample::default()
+    };
+    Ok(joints.into_iter().zip(poses).map(row).collect())
+}

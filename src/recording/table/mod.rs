@@ -1,0 +1,131 @@
+//! Tables as recordings: CSV, and Parquet as LeRobot writes it. A column is one quantity, a row one sample.
+//!
+//! | column | meaning |
+//! | --- | --- |
+//! | `time` (`timestamp`, `t`), `time_ms`, `time_us`, `time_ns` | time |
+//! | `joints.NAME`, or `NAME` where the options or the rig name the joint; `joints.NAME_deg` | joint reading |
+//! | `joint_action.NAME`, `joint_action.NAME_deg` | commanded joint motion |
+//! | `pose.x` `.y` `.z` with `.qx` `.qy` `.qz` `.qw` or `.roll` `.pitch` `.yaw`; `pose_action.…` | pose of the tip, commanded motion |
+//! | `image` (`file`, `filename`) | the image that belongs to the row |
+//! | `CAMERA.FEATURE.u` `.v` | pixel |
+//! | `CAMERA.FEATURE.x` `.y` `.z` | point in the camera's frame |
+//! | `CAMERA.TARGET.x` … `.qw` | pose of a target in the camera's frame |
+//!
+//! LeRobot's `observation.state` are joints, by the names in `meta/info.json`; `action` are targets of joints. What is empty, null or not a
+//! number was not measured.
+mod columns;
+mod csv;
+mod lerobot;
+mod parquet;
+mod samples;
+
+use super::{RecordedCamera, Recording};
+use crate::Error;
+use std::path::Path;
+
+/// What of a table is meant, where its columns alone do not tell.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TableOptions {
+    /// Names of the joints from base to tip, some of those in the table; empty: `known_joints`, or all in the order of their columns.
+    pub joints: Vec<String>,
+    /// Names that the joints have where the table has all of them, as those of a rig.
+    pub known_joints: Vec<String>,
+    /// The unit of joints whose column does not say it.
+    pub angles: Angles,
+    /// What `action.NAME`, LeRobot's `action`, holds.
+    pub actions: Actions,
+    /// Episodes to read (`episode_index`); empty: all.
+    pub episodes: Vec<u64>,
+    /// What is known of the cameras, by name.
+    pub cameras: Vec<RecordedCamera>,
+}
+
+/// The unit of joints.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Angles {
+    /// Radians or metres as long as they could be: what is beyond two turns is refused.
+    #[default]
+    Unsaid,
+    /// Radians or metres, whatever they are.
+    Radians,
+    /// These joints are in degrees, all where none is named.
+    Degrees(Vec<String>),
+}
+
+/// What actions hold.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Actions {
+    /// That is not known: they are left out.
+    #[default]
+    Unsaid,
+    /// Joint positions to go to: the commanded motion is from the reading of the same row.
+    Targets,
+    /// Joint motions.
+    Motions,
+}
+
+/// A table as a recording, and what has to be said of it.
+#[derive(Clone, Debug)]
+pub struct Table {
+    /// One sample for each row.
+    pub recording: Recording,
+    /// For each row the name of the image that it goes with, without folder and ending, where a CSV file has a column `image`; otherwise empty.
+    pub images: Vec<String>,
+    /// What was left out and what was taken for granted: one line each.
+    pub notes: Vec<String>,
+}
+
+impl Table {
+    /// Reads a CSV file: values apart by `,`, `;` or tab, a header in the first line, comments in lines that begin with `#`.
+    ///
+    /// Errors: [`Error::Io`], and [`Error::Malformed`] with the place of what cannot be read.
+    pub fn read_csv(path: &Path, options: &TableOptions) -> Result<Table, Error> {
+        samples::read(csv::Csv::open(path)?, options, &[])
+    }
+
+    /// Reads a Parquet file of numbers, or of a LeRobot dataset, whose `meta/info.json` is looked for beside and above it.
+    ///
+    /// Errors: [`Error::Io`], and [`Error::Unusable`] with row and column.
+    pub fn read_parquet(path: &Path, options: &TableOptions) -> Result<Table, Error> {
+        let info = lerobot::Info::find(path)?;
+        samples::read(parquet::Parquet::open(path, &info)?, options, &info.cameras)
+    }
+
+    /// Reads all of a LeRobot dataset: the Parquet files in the folder `data` beside `meta/info.json`, in the order of their names.
+    ///
+    /// Errors: those of [`Table::read_parquet`], and [`Error::Unusable`] for a folder that is no dataset.
+    pub fn read_lerobot(folder: &Path, options: &TableOptions) -> Result<Table, Error> {
+        let files = lerobot::files(folder)?;
+        let mut notes = Vec::new();
+        let recording = Recording::read_all_with(&files, &mut |file| {
+            let table = Table::read_parquet(file, options)?;
+            for note in table.notes {
+                if !notes.contains(&note) {
+                    notes.push(note);
+                }
+            }
+            Ok(table.recording)
+        })?;
+        Ok(Table { recording, images: Vec::new(), notes })
+    }
+}
+
+/// A table that is read row by row.
+trait Rows {
+    /// Names of the columns.
+    fn header(&self) -> &[String];
+
+    /// The next row, one number per column, NaN where nothing was measured or the column is not wanted; false at the end.
+    fn next(&mut self, wanted: &[bool], row: &mut Vec<f64>) -> Result<bool, Error>;
+
+    /// The name of the image that belongs to the row that was read last, without folder and ending, where there is such a column.
+    fn image(&self) -> Option<&str> {
+        None
+    }
+
+    /// A problem with a column of the row that was read last, or of the header before any.
+    fn error(&self, column: usize, problem: String) -> Error;
+
+    /// What messages call the file.
+    fn file(&self) -> String;
+}

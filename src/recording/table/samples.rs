@@ -1,0 +1,284 @@
+//! Rows as samples.
+use super::columns::{Angle, Columns, PoseColumns, Turn};
+use super::{Actions, Angles, Rows, Table, TableOptions};
+use crate::Error;
+use crate::error::suggestion;
+use crate::geometry::orientation;
+use crate::recording::{Detection, PointDetection, RecordedCamera, Recording, Sample, TargetDetection};
+use handeye_solvers::Pose;
+use nalgebra::Vector3;
+use std::f64::consts::PI;
+
+/// Beyond it no joint reading is believed to be in radians unless that is said: two turns to either side.
+const FARTHEST: f64 = 4.0 * PI;
+
+/// Reads all rows. `cameras`: what the dataset says of cameras, which the options know better.
+pub(super) fn read(mut rows: impl Rows, options: &TableOptions, cameras: &[RecordedCamera]) -> Result<Table, Error> {
+    let columns = Columns::new(rows.header(), &options.joints, &options.known_joints)
+        .map_err(|(column, problem)| rows.error(column, problem))?;
+    if let Some(problem) = without_effect(&columns, options) {
+        return Err(Error::Unusable(format!("{}: {problem}", rows.file())));
+    }
+    let mut reader = Reader::new(&columns, options);
+    let wanted = columns.wanted(rows.header().len());
+    let (mut row, mut images) = (Vec::new(), Vec::new());
+    while rows.next(&wanted, &mut row)? {
+        let is_taken = reader.take(&row).map_err(|(column, problem)| rows.error(column, problem))?;
+        images.extend(rows.image().filter(|_| is_taken).map(str::to_owned));
+    }
+    let Reader { mut samples, mut notes, rows: count, incomplete, restarts, .. } = reader;
+    let has_anything = |sample: &Sample| {
+        sample.joints.is_some()
+            || sample.pose.is_some()
+            || sample.joint_action.is_some()
+            || sample.pose_action.is_some()
+            || !(sample.pixels.is_empty() && sample.points.is_empty() && sample.targets.is_empty())
+    };
+    if !samples.iter().any(has_anything) {
+        return Err(Error::Unusable(nothing(&rows.file(), rows.header(), count, options)));
+    }
+    if incomplete > 0 {
+        notes.push(format!("{incomplete} rows have some joints or parts of a pose and not all, which are left out"));
+    }
+    if restarts > 0 {
+        notes.push(format!("times begin anew {restarts} times, and are counted on from there, one second later"));
+    }
+    notes.extend(note_on_columns(&columns, options));
+    let (features, places) = columns.features.in_natural_order();
+    samples.iter_mut().for_each(|sample| sample.renumber(&places));
+    let known = options.cameras.iter().chain(cameras);
+    let camera = |name: &String| {
+        let unknown = || RecordedCamera { name: name.clone(), ..RecordedCamera::default() };
+        known.clone().find(|camera| camera.name == *name).cloned().unwrap_or_else(unknown)
+    };
+    let cameras = columns.cameras.iter().map(camera).collect();
+    let recording = Recording { joints: columns.joint_names, cameras, features, samples };
+    Ok(Table { recording, images, notes })
+}
+
+/// What the options name and the table does not have.
+fn without_effect(columns: &Columns, options: &TableOptions) -> Option<String> {
+    let joints = || columns.joint_names.iter().map(String::as_str);
+    if let Angles::Degrees(named) = &options.angles
+        && let Some(name) = named.iter().find(|name| !columns.joint_names.contains(name))
+    {
+        return Some(format!("there is no joint `{name}` to take for degrees {}", suggestion(name, joints())));
+    }
+    let cameras = || columns.cameras.iter().map(String::as_str);
+    if let Some(camera) = options.cameras.iter().find(|camera| !columns.cameras.contains(&camera.name)) {
+        let name = &camera.name;
+        return Some(format!("no column is of a camera `{name}` {}", suggestion(name, cameras())));
+    }
+    (!options.episodes.is_empty() && columns.episode.is_none())
+        .then(|| "has no column `episode_index`, of which --episodes would name some".to_owned())
+}
+
+/// Why a table is no recording.
+fn nothing(file: &str, header: &[String], rows: usize, options: &TableOptions) -> String {
+    let columns = header.join(", ");
+    match rows {
+        0 if options.episodes.is_empty() => format!("{file}: has no rows, only the columns {columns}"),
+        0 => format!("{file}: has no row of episodes {:?}", options.episodes),
+        _ => format!(
+            "{file}: has no joints (`joints.NAME`, or columns that --joints of `handeye convert` names), no pose (`pose.x`) and no features \
+             (`CAMERA.FEATURE.u`); it has the columns {columns}"
+        ),
+    }
+}
+
+fn note_on_columns(columns: &Columns, options: &TableOptions) -> Vec<String> {
+    let mut notes = Vec::new();
+    if !columns.others.is_empty() {
+        notes.push(format!("columns that say nothing of a recording are left out: {}", columns.others.join(", ")));
+    }
+    if !columns.action.is_empty() && options.actions == Actions::Unsaid {
+        notes.push(
+            "actions are left out; --actions of `handeye convert` says whether they are targets or motions".to_owned(),
+        );
+    }
+    let is_given = !options.joints.is_empty() || columns.joint_names == options.known_joints;
+    if !columns.joints.is_empty() && !is_given {
+        notes.push(format!(
+            "joints are in the order of the columns: {}; where that is not from base to tip, give a rig with these names or `handeye convert \
+             --joints`",
+            columns.joint_names.join(", ")
+        ));
+    }
+    let unsaid = columns.joints.iter().filter(|joint| !joint.in_degrees).count();
+    if unsaid > 0 && options.angles == Angles::Unsaid {
+        notes.push("joints are taken for radians or metres, since no column says `_deg`".to_owned());
+    }
+    notes
+}
+
+/// Samples as they come.
+struct Reader<'a> {
+    columns: &'a Columns,
+    options: &'a TableOptions,
+    samples: Vec<Sample>,
+    notes: Vec<String>,
+    /// Rows of the episodes that are read.
+    rows: usize,
+    /// Rows with some joints and not all.
+    incomplete: usize,
+    /// Where times began anew: how often, and what is added to them since [s].
+    restarts: usize,
+    shift: f64,
+    episode: Option<f64>,
+    /// Where each joint stands, and what takes its numbers to radians or metres; `None`: they are that, as far as one can see.
+    joints: Vec<(usize, Option<f64>)>,
+    joint_action: Vec<(usize, Option<f64>)>,
+}
+
+impl<'a> Reader<'a> {
+    fn new(columns: &'a Columns, options: &'a TableOptions) -> Self {
+        let scale = |(joint, angle): (&String, &Angle)| {
+            let scale = match &options.angles {
+                _ if angle.in_degrees => Some(PI / 180.0),
+                Angles::Unsaid => None,
+                Angles::Degrees(named) if named.is_empty() || named.contains(joint) => Some(PI / 180.0),
+                Angles::Degrees(_) | Angles::Radians => Some(1.0),
+            };
+            (angle.column, scale)
+        };
+        let scales = |angles: &[Angle]| columns.joint_names.iter().zip(angles).map(scale).collect::<Vec<_>>();
+        let is_used = columns.joint_action.is_empty() && options.actions != Actions::Unsaid;
+        let joint_action = scales(if is_used { &columns.action } else { &columns.joint_action });
+        Reader {
+            columns,
+            options,
+            samples: Vec::new(),
+            notes: Vec::new(),
+            rows: 0,
+            incomplete: 0,
+            restarts: 0,
+            shift: 0.0,
+            episode: None,
+            joints: scales(&columns.joints),
+            joint_action,
+        }
+    }
+
+    /// Takes a row, and says whether it was one of those that are read. Errors: a column, and what is wrong with its number.
+    fn take(&mut self, row: &[f64]) -> Result<bool, (usize, String)> {
+        let columns = self.columns;
+        if let Some(column) = columns.episode {
+            let episode = row[column];
+            let is_meant = |named: &u64| *named as f64 == episode;
+            if !self.options.episodes.is_empty() && !self.options.episodes.iter().any(is_meant) {
+                return Ok(false);
+            }
+            if self.episode.is_some_and(|last| last != episode)
+                && let Some(last) = self.samples.last_mut()
+            {
+                // It does not lead to the first row of the next episode.
+                (last.joint_action, last.pose_action) = (None, None);
+            }
+            self.episode = Some(episode);
+        }
+        self.rows += 1;
+        let mut sample = Sample { time: self.time(row), ..Sample::default() };
+        sample.joints = self.angles(row, &self.joints)?;
+        sample.joint_action = self.angles(row, &self.joint_action)?;
+        if self.options.actions == Actions::Targets && columns.joint_action.is_empty() {
+            let motion =
+                |(target, joints): (Vec<f64>, &Vec<f64>)| target.iter().zip(joints).map(|(a, b)| a - b).collect();
+            sample.joint_action = sample.joint_action.zip(sample.joints.as_ref()).map(motion);
+        }
+        sample.pose = columns.pose.map_or(Ok(None), |pose| pose.read(row))?;
+        sample.pose_action = columns.pose_action.map_or(Ok(None), |pose| pose.read(row))?;
+        let is_partial = |angles: &[(usize, Option<f64>)]| {
+            let missing = angles.iter().filter(|(column, _)| row[*column].is_nan()).count();
+            missing > 0 && missing < angles.len()
+        };
+        let is_half = |pose: Option<PoseColumns>, read: Option<Pose>| {
+            read.is_none() && pose.is_some_and(|pose| pose.columns().iter().any(|column| !row[*column].is_nan()))
+        };
+        if is_partial(&self.joints) || is_partial(&self.joint_action) || is_half(columns.pose, sample.pose) {
+            self.incomplete += 1;
+        }
+        for &(camera, feature, at) in &columns.pixels {
+            if let Some(pixel) = whole(row, at)? {
+                sample.pixels.push(Detection { camera, feature, pixel });
+            }
+        }
+        for &(camera, feature, at) in &columns.points {
+            if let Some(point) = whole(row, at)? {
+                sample.points.push(PointDetection { camera, feature, point });
+            }
+        }
+        for (camera, target, pose) in &columns.targets {
+            if let Some(pose) = pose.read(row)? {
+                let detection = TargetDetection { camera: *camera, target: target.clone(), pose, covariance: None };
+                sample.targets.push(detection);
+            }
+        }
+        self.samples.push(sample);
+        Ok(true)
+    }
+
+    /// The time of a row [s], which goes on where times begin anew.
+    fn time(&mut self, row: &[f64]) -> Option<f64> {
+        let (column, unit) = self.columns.time?;
+        let time = row[column] * unit;
+        if time.is_nan() {
+            return None;
+        }
+        let last = self.samples.iter().rev().find_map(|sample| sample.time);
+        if self.columns.episode.is_some()
+            && let Some(last) = last
+            && time + self.shift < last
+        {
+            self.restarts += 1;
+            self.shift = last + 1.0 - time;
+        }
+        Some(time + self.shift)
+    }
+
+    /// Numbers of all joints; `None` where one is missing.
+    fn angles(&self, row: &[f64], joints: &[(usize, Option<f64>)]) -> Result<Option<Vec<f64>>, (usize, String)> {
+        if joints.is_empty() || joints.iter().any(|(column, _)| row[*column].is_nan()) {
+            return Ok(None);
+        }
+        let angle = |&(column, scale): &(usize, Option<f64>)| match (row[column], scale) {
+            (value, Some(scale)) => Ok(value * scale),
+            (value, None) if value.abs() <= FARTHEST => Ok(value),
+            (value, None) => Err((
+                column,
+                format!(
+                    "{value} is more than two turns, and joints are in radians or metres: `handeye convert` takes them for degrees with \
+                     --degrees, and as they are with --radians"
+                ),
+            )),
+        };
+        joints.iter().map(angle).collect::<Result<Vec<f64>, _>>().map(Some)
+    }
+}
+
+/// Numbers that were measured together; `None` where none of them was.
+fn whole<const N: usize>(row: &[f64], columns: [usize; N]) -> Result<Option<[f64; N]>, (usize, String)> {
+    let numbers = columns.map(|column| row[column]);
+    match columns.iter().find(|column| row[**column].is_nan()) {
+        None => Ok(Some(numbers)),
+        Some(_) if numbers.iter().all(|number| number.is_nan()) => Ok(None),
+        Some(&missing) => Err((missing, "this is empty, and what belongs to it is not".to_owned())),
+    }
+}
+
+impl PoseColumns {
+    /// The pose in a row; `None` where a part of it is missing.
+    fn read(&self, row: &[f64]) -> Result<Option<Pose>, (usize, String)> {
+        if self.columns().iter().any(|column| row[*column].is_nan()) {
+            return Ok(None);
+        }
+        let rotation = match self.turn {
+            Turn::Quaternion(columns) => orientation::from_quaternion(columns.map(|column| row[column]))
+                .ok_or_else(|| (columns[0], "a quaternion of length 0 is no rotation".to_owned()))?,
+            Turn::RollPitchYaw(angles) => orientation::from_rpy(
+                angles.map(|angle| row[angle.column] * if angle.in_degrees { PI / 180.0 } else { 1.0 }),
+            ),
+        };
+        let [x, y, z] = self.xyz.map(|column| row[column]);
+        Ok(Some(Pose { rotation, translation: Vector3::new(x, y, z) }))
+    }
+}
