@@ -3,6 +3,7 @@
 pub mod calibrate;
 pub mod camera;
 pub mod chain;
+pub mod detect;
 pub mod doctor;
 mod error;
 pub mod experiments;

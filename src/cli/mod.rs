@@ -6,6 +6,7 @@ mod completions;
 mod convert;
 mod counts;
 mod demo;
+mod detect;
 mod evaluate;
 mod experiment;
 mod export;
@@ -71,6 +72,7 @@ enum Command {
     Task(task::Task),
     Experiment(experiment::ExperimentCommand),
     Convert(convert::Convert),
+    Detect(detect::Detect),
     Export(export::Export),
     Completions(completions::Completions),
 }
@@ -98,6 +100,7 @@ impl Cli {
             Command::Task(task) => task.run(),
             Command::Experiment(experiment) => experiment.run(),
             Command::Convert(convert) => convert.run(),
+            Command::Detect(detect) => detect.run(),
             Command::Export(export) => export.run(),
             Command::Completions(completions) => completions.run(),
         }

@@ -7,6 +7,7 @@ mod cli_calibrate;
 mod cli_infer;
 mod cli_servo;
 mod depth;
+mod detect;
 mod determinism;
 mod deviations;
 mod doctor;

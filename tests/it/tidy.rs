@@ -10,6 +10,7 @@ const ORDER: &[&[&str]] = &[
     &["rig"],
     &["export"],
     &["recording"],
+    &["detect"],
     &["reach"],
     &["simulate"],
     &["factors"],

@@ -1,0 +1,204 @@
+//! `handeye detect`: images as a recording.
+use super::answer::Answer;
+use super::inputs::{check_output, read_camera};
+use super::words::count;
+use clap::{Args, ValueEnum};
+use handeye::Error;
+use handeye::detect::{Folder, Gray, Pattern, detect_in_folders};
+use handeye::recording::{Bag, BagOptions, Format, Opened, Pairing, RecordedCamera, Recording};
+use rayon::prelude::*;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Find the corners of tags and boards in images, and write them as a recording (JSON Lines)
+///
+/// Images are PNG or JPEG in a folder per camera, or compressed images (sensor_msgs/CompressedImage) in a ROS 2 bag. Where the robot was is in the
+/// bag, or in a recording that --states names: its rows pair with the images in order, by name (a column `image` of a CSV file) or by time.
+/// Images of several cameras that have the same name belong together.
+///
+/// Patterns: a family of tags (tag36h11, tag25h9, tag16h5, DICT_4X4_50 to DICT_7X7_1000), whose corners are called FAMILY:ID/CORNER, of AprilTags in
+/// the order of their own detector (from the lower left against the clock), of the others in OpenCV's (from the upper left with the clock);
+/// checkerboard=COLUMNSxROWS, of inner corners, which has to be seen whole; charuco=COLUMNSxROWS:FAMILY:RATIO, of squares, with the side of the
+/// tags over that of the squares, in OpenCV's layout since 4.6. Corners of boards are called corner:ROW/COLUMN. A checkerboard whose columns and rows
+/// are both even or both odd looks the same turned by half: its corner 0/0 is taken to be the higher one in every image.
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  handeye detect images/left images/right --pattern tag36h11 --states joints.csv -o motions.jsonl
+  handeye detect images --pattern checkerboard=9x6 --states joints.csv --pair time -o motions.jsonl
+  handeye detect hand=shots --pattern charuco=7x5:DICT_5X5_100:0.75 --camera hand=hand.yaml --side 0.03 --states poses.csv -o motions.jsonl
+  handeye detect motions.mcap --pattern tag36h11 -o motions.jsonl")]
+pub struct Detect {
+    /// Folders of images, each of the camera that is named or called as the folder is; a folder of such folders; or a bag (.mcap)
+    #[arg(value_name = "[CAMERA=]FOLDER|BAG", required = true)]
+    images: Vec<String>,
+    /// What to look for
+    #[arg(long, value_name = "PATTERN", required = true)]
+    pattern: Vec<String>,
+    /// Where the robot was: a recording, bag or table
+    #[arg(long, value_name = "FILE")]
+    states: Option<PathBuf>,
+    /// How images find their row of the states
+    #[arg(long, value_name = "HOW", default_value = "order", requires = "states")]
+    pair: How,
+    /// What is known of a camera: a calibration file (ROS, OpenCV, Kalibr)
+    #[arg(long, value_name = "NAME=FILE")]
+    camera: Vec<String>,
+    /// The side of a tag, or of a board's squares [m]: writes the poses of targets too, of cameras whose intrinsics are known
+    #[arg(long, value_name = "METRES", value_parser = metres)]
+    side: Option<f64>,
+    /// The recording to write
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum How {
+    /// The first image with the first row
+    Order,
+    /// By the names that the rows have
+    Name,
+    /// By the times that the images are called, interpolated
+    Time,
+}
+
+impl Detect {
+    pub fn run(&self) -> Result<Answer, Error> {
+        let inputs: Vec<PathBuf> = self.images.iter().map(PathBuf::from).chain(self.states.clone()).collect();
+        check_output(&self.output, &inputs)?;
+        let patterns = self.patterns()?;
+        let cameras = self.camera.iter().map(|text| read_camera(text)).collect::<Result<Vec<_>, _>>()?;
+        let bags = self.images.iter().filter(|image| Format::of(Path::new(image)) == Format::Bag).count();
+        let (mut recording, mut notes) = match (bags, &self.images[..]) {
+            (0, _) => self.from_folders(&patterns)?,
+            (_, [bag]) if self.states.is_none() => from_bag(Path::new(bag), &patterns)?,
+            _ => {
+                let problem = "a bag goes alone, with the states that it has itself";
+                return Err(Error::Unusable(problem.to_owned()));
+            }
+        };
+        describe(&mut recording, &cameras)?;
+        if recording.samples.is_empty() {
+            return Err(Error::NotEnoughData(format!("no image shows {}", self.pattern.join(" or "))));
+        }
+        if let (Some(side), Some(pattern)) = (self.side, patterns.first()) {
+            let (unclear, blind) = recording.add_targets(pattern, side);
+            if unclear > 0 {
+                notes.push(format!(
+                    "{unclear} poses of targets are left out, since their mirror images fit hardly worse"
+                ));
+            }
+            if !blind.is_empty() {
+                let cameras = blind.join(", ");
+                notes.push(format!(
+                    "no targets of cameras without intrinsics: {cameras} (--camera NAME=FILE gives them)"
+                ));
+            }
+        }
+        if patterns.iter().any(Pattern::is_ambiguous) {
+            notes.push(
+                "this checkerboard looks the same turned by half: corner 0/0 is the higher one in each image, which has to be the same corner in all"
+                    .to_owned(),
+            );
+        }
+        recording.write(&self.output)?;
+        Ok(self.answer(&recording, &notes))
+    }
+
+    fn patterns(&self) -> Result<Vec<Pattern>, Error> {
+        let parse = |text: &String| {
+            Pattern::parse(text).map_err(|problem| Error::Unusable(format!("--pattern {text}: {problem}")))
+        };
+        let patterns: Vec<Pattern> = self.pattern.iter().map(parse).collect::<Result<_, _>>()?;
+        let boards = patterns.iter().filter(|pattern| !matches!(pattern, Pattern::Tags(_))).count();
+        if boards > 1 || (self.side.is_some() && patterns.len() > 1) {
+            let problem = "--pattern: corners of two boards would have the same names, and --side is of one pattern";
+            return Err(Error::Unusable(problem.to_owned()));
+        }
+        Ok(patterns)
+    }
+
+    fn from_folders(&self, patterns: &[Pattern]) -> Result<(Recording, Vec<String>), Error> {
+        let mut folders = Vec::new();
+        for image in &self.images {
+            let named = image.split_once('=').filter(|_| !Path::new(image).exists());
+            let (camera, folder) = named.map_or((None, image.as_str()), |(camera, folder)| (Some(camera), folder));
+            folders.extend(Folder::open(Path::new(folder), camera)?);
+        }
+        let states = self.states.as_ref().map(|path| Recording::open(path, &[])).transpose()?;
+        let (cameras, seen) = detect_in_folders(&folders, patterns)?;
+        let pairing = match self.pair {
+            How::Order => Pairing::Order,
+            How::Name => Pairing::Name,
+            How::Time => Pairing::Time,
+        };
+        let rows = states.as_ref().map(|opened| (&opened.recording, &opened.images[..], pairing));
+        let file = self.states.as_deref().unwrap_or(Path::new("images")).display();
+        let (recording, mut notes) = Recording::from_images(cameras, &seen, rows)
+            .map_err(|problem| Error::Unusable(format!("{file}: {problem}")))?;
+        notes.extend(states.into_iter().flat_map(|Opened { notes, .. }| notes));
+        Ok((recording, notes))
+    }
+
+    fn answer(&self, recording: &Recording, notes: &[String]) -> Answer {
+        let detections = recording.samples.iter().map(|sample| sample.pixels.len()).sum::<usize>();
+        let targets = recording.samples.iter().map(|sample| sample.targets.len()).sum::<usize>();
+        let text = format!(
+            "{}: {}, {} with {}, {}{}\n{}",
+            self.output.display(),
+            count(recording.samples.len(), "sample"),
+            count(recording.cameras.len(), "camera"),
+            count(recording.features.len(), "feature"),
+            count(detections, "detection"),
+            if targets > 0 { format!(", {}", count(targets, "target pose")) } else { String::new() },
+            notes.iter().map(|note| format!("  {note}\n")).collect::<String>()
+        );
+        let json = json!({
+            "output": self.output.display().to_string(),
+            "samples": recording.samples.len(),
+            "joints": recording.joints,
+            "cameras": recording.cameras.iter().map(|camera| &camera.name).collect::<Vec<_>>(),
+            "features": recording.features.len(),
+            "detections": detections,
+            "targets": targets,
+            "notes": notes,
+        });
+        Answer::new(text, json)
+    }
+}
+
+fn from_bag(path: &Path, patterns: &[Pattern]) -> Result<(Recording, Vec<String>), Error> {
+    let look = |bytes: &&[u8]| {
+        let image = Gray::decode(bytes)?;
+        Ok(patterns.iter().flat_map(|pattern| pattern.detect(&image)).collect())
+    };
+    let mut detect = |images: &[&[u8]]| images.par_iter().map(look).collect::<Vec<Result<_, String>>>();
+    let options = BagOptions::default();
+    let Bag { recording, notes } = Bag::detect(path, &options, &mut detect)?;
+    Ok((recording, notes))
+}
+
+/// Adds what the options know of the cameras.
+fn describe(recording: &mut Recording, cameras: &[RecordedCamera]) -> Result<(), Error> {
+    for known in cameras {
+        let name = &known.name;
+        let Some(camera) = recording.cameras.iter_mut().find(|camera| camera.name == *name) else {
+            return Err(Error::Unusable(format!("--camera {name}: there are no images of this camera")));
+        };
+        if let (Some(said), Some(size)) = (known.size, camera.size)
+            && said != size
+        {
+            let problem = format!("--camera {name}: is of {said:?} pixels, and its images are of {size:?}");
+            return Err(Error::Unusable(problem));
+        }
+        *camera = RecordedCamera { size: camera.size.or(known.size), ..known.clone() };
+    }
+    Ok(())
+}
+
+fn metres(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(metres) if metres > 0.0 && f64::is_finite(metres) => Ok(metres),
+        _ => Err("must be a number of metres above 0".to_owned()),
+    }
+}
