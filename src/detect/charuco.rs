@@ -79,7 +79,7 @@ impl Charuco {
     /// The tag on a square.
     fn tag(&self, row: usize, column: usize) -> Option<u32> {
         // Bright squares of all rows before: every other square, the first of which is dark.
-        let before = row * self.columns / 2 + if row % 2 == 0 { column / 2 } else { column.div_ceil(2) };
+        let before = row * self.columns / 2 + if row.is_multiple_of(2) { column / 2 } else { column.div_ceil(2) };
         ((row + column) % 2 == 1).then_some(before as u32)
     }
 }

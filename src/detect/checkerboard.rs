@@ -121,7 +121,7 @@ impl Checkerboard {
         for row in 0..self.rows - 1 {
             for column in 0..self.columns - 1 {
                 let brightness = middle(row, column).unwrap_or(0.0);
-                *(if (row + column) % 2 == 0 { &mut first } else { &mut second }) += brightness;
+                *(if (row + column).is_multiple_of(2) { &mut first } else { &mut second }) += brightness;
             }
         }
         let squares = (self.rows - 1) * (self.columns - 1);

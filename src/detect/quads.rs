@@ -109,9 +109,8 @@ fn refined(image: &Gray, rough: &Quad) -> Option<Quad> {
     let shortest = (0..4).map(|k| distance(quad[k], quad[(k + 1) % 4])).fold(f64::INFINITY, f64::min);
     for reach in [2.5_f64.min(0.12 * shortest + 1.0), 2.0_f64.min(0.1 * shortest + 0.5)] {
         let sides: Vec<Line> = (0..4).map(|k| edge(image, quad[k], quad[(k + 1) % 4], reach)).collect::<Option<_>>()?;
-        for k in 0..4 {
-            quad[k] = meeting(&sides[(k + 3) % 4], &sides[k])?;
-        }
+        let corner = |k: usize| meeting(&sides[(k + 3) % 4], &sides[k]);
+        quad = [corner(0)?, corner(1)?, corner(2)?, corner(3)?];
     }
     let moved = (0..4).map(|k| distance(quad[k], rough[k])).fold(0.0, f64::max);
     (moved < 0.25 * shortest + 2.0).then_some(quad)

@@ -43,22 +43,22 @@ impl Recording {
         let blind = blind.map(|(camera, _)| camera.name.clone()).collect();
         let mut unclear = 0;
         for sample in &mut self.samples {
-            let mut found: BTreeMap<(u32, String), (Vec<Vector3<f64>>, Vec<Vector3<f64>>)> = BTreeMap::new();
+            let mut found: BTreeMap<(u32, String), Sighted> = BTreeMap::new();
             for Detection { camera, feature, pixel } in &sample.pixels {
                 let Some(lens) = &lenses[*camera as usize] else { continue };
                 let bearing = self.cameras[*camera as usize].model.unwrap_or_default().unproject(lens, *pixel);
                 let place = pattern.place(&self.features[*feature as usize]);
                 if let (Some((target, [x, y])), Some(bearing)) = (place, bearing) {
-                    let (points, bearings) = found.entry((*camera, target)).or_default();
-                    points.push(Vector3::new(x * side, y * side, 0.0));
-                    bearings.push(bearing);
+                    let seen = found.entry((*camera, target)).or_default();
+                    seen.points.push(Vector3::new(x * side, y * side, 0.0));
+                    seen.bearings.push(bearing);
                 }
             }
-            for ((camera, target), (points, bearings)) in found {
-                if points.len() < LEAST {
+            for ((camera, target), seen) in found {
+                if seen.points.len() < LEAST {
                     continue;
                 }
-                match clear(&points, &bearings) {
+                match seen.pose() {
                     Some(pose) => sample.targets.push(TargetDetection { camera, target, pose, covariance: None }),
                     None => unclear += 1,
                 }
@@ -68,17 +68,25 @@ impl Recording {
     }
 }
 
-/// The pose that fits clearly better than any other.
-fn clear(points: &[Vector3<f64>], bearings: &[Vector3<f64>]) -> Option<Pose> {
-    let poses = resect(points, bearings);
-    let error = |pose: &Pose| {
-        let off = |(point, bearing): (&Vector3<f64>, &Vector3<f64>)| {
-            (pose.transform(point).normalize() - bearing).norm_squared()
+/// Corners of one target: where they are in its frame, and the unit directions that they are seen in.
+#[derive(Default)]
+struct Sighted {
+    points: Vec<Vector3<f64>>,
+    bearings: Vec<Vector3<f64>>,
+}
+
+impl Sighted {
+    /// The pose that fits clearly better than any other.
+    fn pose(&self) -> Option<Pose> {
+        let poses = resect(&self.points, &self.bearings);
+        let error = |pose: &Pose| {
+            let seen = self.points.iter().zip(&self.bearings);
+            let off = seen.map(|(point, bearing)| (pose.transform(point).normalize() - bearing).norm_squared());
+            off.sum::<f64>().sqrt()
         };
-        points.iter().zip(bearings).map(off).sum::<f64>().sqrt()
-    };
-    let best = *poses.first()?;
-    (poses.get(1).is_none_or(|other| error(other) > CLEARER * error(&best))).then_some(best)
+        let best = *poses.first()?;
+        poses.get(1).is_none_or(|other| error(other) > CLEARER * error(&best)).then_some(best)
+    }
 }
 
 fn parameters(camera: &RecordedCamera) -> Option<[f64; PARAMETERS]> {

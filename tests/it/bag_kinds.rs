@@ -27,7 +27,7 @@ impl Cdr {
 
     /// `bytes`: a number, its lowest byte first.
     fn number<const N: usize>(&mut self, mut bytes: [u8; N]) {
-        while (self.bytes.len() - 4) % N != 0 {
+        while !(self.bytes.len() - 4).is_multiple_of(N) {
             self.bytes.push(0xee);
         }
         if self.is_big {

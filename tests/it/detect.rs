@@ -107,6 +107,12 @@ fn png(image: &Gray) -> Vec<u8> {
     bytes.into_inner()
 }
 
+/// Where features are in an image, by name.
+type Truth = BTreeMap<String, [f64; 2]>;
+
+/// What was found in an image, and the truth.
+type Looked = (Vec<(String, [f64; 2])>, Truth);
+
 /// How far found corners are from where they are: sorted distances, and the mean on each axis.
 struct Errors {
     sorted: Vec<f64>,
@@ -114,7 +120,7 @@ struct Errors {
 }
 
 /// Compares what was found with the truth, which has to have every name that was found; says how many were.
-fn errors(views: &[(Vec<(String, [f64; 2])>, BTreeMap<String, [f64; 2]>)]) -> Errors {
+fn errors(views: &[Looked]) -> Errors {
     let mut off = Vec::new();
     for (found, truth) in views {
         for (name, pixel) in found {
@@ -134,8 +140,8 @@ fn rendered<P: Fn(f64, f64) -> bool>(
     count: u64,
     size: [f64; 2],
     depth: f64,
-    print: impl Fn(u64) -> (P, BTreeMap<String, [f64; 2]>),
-) -> Vec<(Vec<(String, [f64; 2])>, BTreeMap<String, [f64; 2]>)> {
+    print: impl Fn(u64) -> (P, Truth),
+) -> Vec<Looked> {
     let pattern = Pattern::parse(pattern).unwrap();
     let view = |seed: u64| {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -150,7 +156,7 @@ fn rendered<P: Fn(f64, f64) -> bool>(
 }
 
 /// Corners by the order in which a family counts them, of a tag from (0, 0) to (side, side) as OpenCV prints it.
-fn corners(family: &str, id: u32, side: f64) -> BTreeMap<String, [f64; 2]> {
+fn corners(family: &str, id: u32, side: f64) -> Truth {
     let [a, b, c, d] = [[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]];
     // The AprilTag library holds OpenCV's tag upside down, and counts from its lower left corner against the clock.
     let order = if family == "tag36h11" { [b, a, d, c] } else { [a, b, c, d] };
@@ -237,7 +243,7 @@ fn is_dark_square(x: f64, y: f64, columns: f64, rows: f64) -> bool {
 }
 
 /// Inner corners of a board of so many squares.
-fn inner(columns: usize, rows: usize) -> BTreeMap<String, [f64; 2]> {
+fn inner(columns: usize, rows: usize) -> Truth {
     let places = (0..rows - 1).flat_map(|row| (0..columns - 1).map(move |column| (row, column)));
     let place =
         |(row, column)| (format!("corner:{row}/{column}"), [SQUARE * (column + 1) as f64, SQUARE * (row + 1) as f64]);
@@ -294,7 +300,7 @@ const CHARUCO: f64 = 0.045;
 
 #[test]
 fn corners_of_a_charuco_board_are_named_even_where_only_a_part_of_it_is_seen() {
-    let places = || -> BTreeMap<String, [f64; 2]> {
+    let places = || -> Truth {
         let scale = CHARUCO / SQUARE;
         inner(4, 3).into_iter().map(|(name, place)| (name, place.map(|part| part * scale))).collect()
     };
@@ -324,7 +330,7 @@ fn hand_eye(folder: &Folder, count: u64) -> View {
     let mut poses = "image,time,pose.x,pose.y,pose.z,pose.qx,pose.qy,pose.qz,pose.qw".to_owned();
     for seed in 0..count {
         let mut rng = ChaCha8Rng::seed_from_u64(100 + seed);
-        let view = View::random(&mut rng, [4.0 * CHARUCO, 3.0 * CHARUCO], rng_depth(seed));
+        let view = View::random(&mut rng, [4.0 * CHARUCO, 3.0 * CHARUCO], 0.45 + 0.02 * seed as f64);
         let image = view.render(is_dark_charuco, 0.8, 2.0, &mut rng);
         let name = format!("shot-{seed}.png");
         std::fs::write(folder.path().join("shots/hand").join(&name), png(&image)).unwrap();
@@ -352,10 +358,6 @@ fn hand_eye(folder: &Folder, count: u64) -> View {
         ),
     );
     hand_from_camera
-}
-
-fn rng_depth(seed: u64) -> f64 {
-    0.45 + 0.02 * seed as f64
 }
 
 #[test]

@@ -72,8 +72,9 @@ pub(super) fn need<T>(field: Option<T>, name: &str) -> Result<T, String> {
 
 /// The stamp of a header [ns].
 pub(super) fn stamp(message: &Value) -> Result<i64, String> {
-    let part = |name: &str| need(message.number(&format!("header.stamp.{name}")), &format!("header.stamp.{name}"));
-    Ok((part("sec")? as i64).saturating_mul(1_000_000_000).saturating_add(part("nanosec")? as i64))
+    let part = |name: &str| need(message.number(name), name);
+    let (seconds, nanoseconds) = (part("header.stamp.sec")?, part("header.stamp.nanosec")?);
+    Ok((seconds as i64).saturating_mul(1_000_000_000).saturating_add(nanoseconds as i64))
 }
 
 /// The frame of a header; a leading `/` is of ROS 1.
