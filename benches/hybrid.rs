@@ -66,7 +66,7 @@ fn run(seed: u64, known: Known, controller: Makes) -> (Stop, usize) {
     loop {
         let sample = world.look();
         let (joints, seen) = (sample.joints.clone().unwrap_or_default(), names.sightings(&sample));
-        let now = Measurement { time: world.time(), joints: &joints, seen: &seen };
+        let now = Measurement { time: world.time(), joints: &joints, seen: &seen, points: &[] };
         let tick = servo.tick(world.time(), &now, &[], 1.0).expect("fits");
         if let Some(stop) = tick.stop {
             return (stop, commands);

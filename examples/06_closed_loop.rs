@@ -31,7 +31,7 @@ fn main() -> Result<(), handeye::Error> {
         let sample = robot.look();
         let seen = names.sightings(&sample);
         let joints = sample.joints.as_deref().unwrap_or_default();
-        let measured = Measurement { time: sample.time.unwrap_or(f64::NAN), joints, seen: &seen };
+        let measured = Measurement { time: sample.time.unwrap_or(f64::NAN), joints, seen: &seen, points: &[] };
         let tick = servo.tick(robot.time(), &measured, &[], dt)?;
         println!("{:4.1} s: {:8.3} px", robot.time(), tick.error_px.unwrap_or(f64::NAN));
         if let Some(stop) = tick.stop {

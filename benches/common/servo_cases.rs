@@ -90,7 +90,7 @@ impl Cases {
                     continue;
                 }
                 let read: Vec<f64> = joints.iter().map(|joint| joint + normal(noise, random)).collect();
-                let now = Measurement { time: command as f64, joints: &read, seen: &seen };
+                let now = Measurement { time: command as f64, joints: &read, seen: &seen, points: &[] };
                 let Ok(Command::JointDelta(motion)) = servo.decide(&now, &[], 1.0).map(|decision| decision.command)
                 else {
                     lost = true;

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 /// Servo in simulation, and report the pixel error against step
 ///
 /// The controller knows LEARNED; the world is the rig that the scene names, or LEARNED itself where it names none. Without LEARNED the
-/// controller is uncalibrated: it explores, and knows nothing but the joints' limits. The loop says why it stopped: converged, no better
+/// controller is uncalibrated: it explores, and knows nothing but the joints' limits; so is that of a scene with a task in images. The loop says why it stopped: converged, no better
 /// given the noise, blocked by limits, diverged, undetermined, lost, timed out.
 #[derive(Args)]
 #[command(
@@ -28,13 +28,14 @@ Examples:
   handeye servo learned.toml ur5-reach --report reach.html  an animation to look at
   handeye servo learned.toml scene.toml --json
   handeye servo ur5-uncalibrated                           without any rig
+  handeye servo ur5-wrench                                 a task in images, without any rig
   handeye servo ur5 ur5-noisy --seed 7"
 )]
 pub struct Servo {
     /// The rig that the controller knows: a file in which every value is given, or the name of a shipped rig
     #[arg(value_name = "LEARNED")]
     rig: Option<PathBuf>,
-    /// A scene file, or the name of a shipped scene (ur5-reach, ur5-visual, ur5-noisy, ur5-uncalibrated)
+    /// A scene file, or the name of a shipped scene (ur5-reach, ur5-visual, ur5-noisy, ur5-uncalibrated, ur5-wrench, ur5-moving)
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
     /// Seed of all noise, in place of the scene's

@@ -93,7 +93,7 @@ fn errors<C: Controller>(
         let sample = world.look();
         let (joints, seen) = (sample.joints.unwrap_or_default(), sample.pixels);
         let seen = names.sightings(&Sample { pixels: seen, ..Sample::default() });
-        let now = Measurement { time: world.time(), joints: &joints, seen: &seen };
+        let now = Measurement { time: world.time(), joints: &joints, seen: &seen, points: &[] };
         let tick = servo.tick(world.time(), &now, &[], 1.0)?;
         world.execute(&tick.command, 1.0)?;
         errors.push(distance(&world.exact(world.joints()), &goal));

@@ -1,19 +1,25 @@
 //! Scenes: a world, a target, a controller and its limits in a file, run to the end.
 mod catalog;
+mod place;
 mod plot;
 mod read;
 mod read_control;
 mod read_faults;
 mod read_limits;
+mod read_target;
 mod run;
+mod target;
 
 pub use catalog::ALL;
 pub use plot::svg;
-pub use read_faults::NamedFault;
+pub use read_faults::{NamedCoupling, NamedFault, NamedSlip};
 pub use run::{Moment, Run, run};
+pub use target::{Target, Waypoint};
 
 use crate::rig::Rig;
+use crate::servo::image_tasks::ImageTask;
 use crate::servo::limits::Guide;
+use crate::servo::uncalibrated::Settings;
 use crate::servo::{ImageSettings, LoopSettings, PoseSettings, Takes};
 use crate::simulate::world::WorldOptions;
 use nalgebra::Vector3;
@@ -29,11 +35,19 @@ pub struct Scene {
     pub world: WorldOptions,
     /// Trackers that fail.
     pub faults: Vec<NamedFault>,
+    /// Joints that slip.
+    pub slips: Vec<NamedSlip>,
+    /// Joints that others drag along.
+    pub couplings: Vec<NamedCoupling>,
+    /// What shall meet what; `None` where all features shall be seen where they are with the joints of the target. Features on the hand and
+    /// on the target that have their `xyz` in the task are there in the tip's frame, those on the target as the tip has it with the joints of
+    /// the target: there the task is solved. Others are where the rig has those of their names.
+    pub task: Option<ImageTask>,
     /// What the robot takes.
     pub takes: Takes,
     /// Joints at the beginning [rad or m].
     pub start: Vec<f64>,
-    /// Where the features shall be seen: where they are with these joints, which may move.
+    /// Where the arm shall be, which may move.
     pub target: Target,
     /// What turns measurements into commands; `None` is [`Control::ModelBased`] with a rig, and [`Control::Uncalibrated`] without.
     pub control: Option<Control>,
@@ -43,26 +57,6 @@ pub struct Scene {
     pub settings: LoopSettings,
     /// Seconds from one command to the next.
     pub dt: f64,
-}
-
-/// Joints whose pixels are aimed at.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Target {
-    /// At the beginning [rad or m].
-    pub joints: Vec<f64>,
-    /// How fast they move [rad/s or m/s]; empty for a target that stands still.
-    pub velocity: Vec<f64>,
-    /// For how long they move [s].
-    pub until: f64,
-}
-
-impl Target {
-    /// Where it is after some seconds.
-    pub fn at(&self, time: f64) -> Vec<f64> {
-        let time = time.min(self.until);
-        let speed = |i: usize| self.velocity.get(i).copied().unwrap_or(0.0);
-        self.joints.iter().enumerate().map(|(i, joint)| joint + speed(i) * time).collect()
-    }
 }
 
 /// A controller and its settings.
@@ -79,7 +73,7 @@ pub enum Control {
     ImageBased(ImageSettings),
     /// [`crate::servo::PoseBased`].
     PoseBased(PoseSettings),
-    /// [`crate::servo::UncalibratedJoints`].
+    /// [`crate::servo::UncalibratedJoints`], or [`crate::servo::UncalibratedTask`] in a scene with a task.
     Uncalibrated(UncalibratedControl),
 }
 
@@ -98,12 +92,14 @@ impl Control {
 }
 
 /// How [`crate::servo::UncalibratedJoints`] servoes in a scene.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct UncalibratedControl {
-    /// Standard deviation that trackers are taken to have [px].
+    /// Standard deviation that trackers are taken to have [px]; a task has its own.
     pub pixels: f64,
-    /// Share of the errors that a command takes away, in (0, 1]; `None` is the default of its settings.
-    pub gain: Option<f64>,
+    /// Gain, exploration, and how what is known is updated and trusted.
+    pub settings: Settings,
+    /// Motions of a joint that it takes for too small to be carried out [rad or m].
+    pub dead_band: f64,
     /// True where the rig that is known is followed as far as it is right, false where it is not even looked at.
     pub hybrid: bool,
 }
@@ -111,7 +107,7 @@ pub struct UncalibratedControl {
 impl Default for UncalibratedControl {
     /// 0.3 px, without any rig.
     fn default() -> Self {
-        UncalibratedControl { pixels: 0.3, gain: None, hybrid: false }
+        UncalibratedControl { pixels: 0.3, settings: Settings::default(), dead_band: 0.0, hybrid: false }
     }
 }
 

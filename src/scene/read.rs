@@ -1,8 +1,9 @@
 //! Reading scene files, with a place for every mistake.
+use super::Scene;
 use super::read_control::read_control;
-use super::read_faults::read_faults;
+use super::read_faults::{read_couplings, read_faults, read_slips};
 use super::read_limits::read_limits;
-use super::{Scene, Target};
+use super::read_target::{read_target, read_task};
 use crate::Error;
 use crate::rig::read::document::{Fields, Node, Source, parse};
 use crate::rig::read::noise::read_pose_noise;
@@ -31,6 +32,7 @@ impl Scene {
             "dt",
             "robot",
             "tracker",
+            "task",
             "target",
             "controller",
             "limits",
@@ -40,16 +42,23 @@ impl Scene {
             root.field(name).map(|field| Ok(field.value.table(known)?.labelled(name))).transpose()
         };
         let rig = root.optional("rig", |node| read_rig(node, folder))?;
-        let robot = section("robot", &["start", "takes", "readings", "latency", "execution"])?
+        let robot = section("robot", &["start", "takes", "readings", "latency", "execution", "slips", "couplings"])?
             .ok_or_else(|| root.error("has no table `robot`, which says where the arm starts"))?;
-        let target = section("target", &["joints", "velocity", "until"])?
+        let target = section("target", &["joints", "velocity", "until", "path"])?
             .ok_or_else(|| root.error("has no table `target`, which says where the features shall be seen"))?;
-        let (tracker, missed, faults) = match section("tracker", &["kind", "sd", "missed", "faults"])? {
-            Some(fields) => {
-                let (tracker, missed) = read_tracker(&fields)?;
-                (tracker, missed, read_faults(&fields)?)
-            }
-            None => (Tracker::Exact, 0.0, Vec::new()),
+        let task = root.optional("task", |node| read_task(node, folder))?;
+        if let (None, Some(path)) = (&task, target.field("path")) {
+            return Err(path
+                .value
+                .error("moves the target of a `task`, and the scene has none; `velocity` moves joints"));
+        }
+        let tracker = section("tracker", &["kind", "sd", "at", "points", "missed", "faults"])?;
+        let tracker = tracker.as_ref();
+        let (kind, missed) = tracker.map_or(Ok((Tracker::Exact, 0.0)), read_tracker)?;
+        let points = tracker.map(|fields| fields.optional("points", Node::not_negative)).transpose()?.flatten();
+        let control = match root.field("controller") {
+            Some(field) => Some(read_control(field.value, task.is_some())?),
+            None => None,
         };
         let takes =
             robot.optional("takes", |node| node.word("kind of command", Takes::ALL, Takes::name))?.unwrap_or_default();
@@ -59,24 +68,22 @@ impl Scene {
             world: WorldOptions {
                 execution: robot.optional("execution", read_execution)?.unwrap_or_default(),
                 readings: robot.optional("readings", read_readings)?.unwrap_or(default.readings),
-                tracker,
+                slips: Vec::new(),
+                tracker: kind,
+                points: points.unwrap_or(default.points),
                 faults: Vec::new(),
                 missed,
                 latency: robot.optional("latency", Node::not_negative)?.unwrap_or(default.latency),
                 seed: root.optional("seed", Node::whole)?.unwrap_or(default.seed),
             },
-            faults,
+            faults: tracker.map(read_faults).transpose()?.unwrap_or_default(),
+            slips: read_slips(&robot)?,
+            couplings: read_couplings(&robot)?,
+            task,
             takes,
             start: joints(&robot, "start", rig.as_ref())?,
-            target: Target {
-                joints: joints(&target, "joints", rig.as_ref())?,
-                velocity: target.optional("velocity", Node::any_numbers)?.unwrap_or_default(),
-                until: target.optional("until", Node::not_negative)?.unwrap_or(f64::INFINITY),
-            },
-            control: match root.field("controller") {
-                Some(field) => Some(read_control(field.value)?),
-                None => None,
-            },
+            target: read_target(&target, rig.as_ref(), folder)?,
+            control,
             limits: match root.field("limits") {
                 Some(field) => read_limits(field.value)?,
                 None => Vec::new(),
@@ -111,7 +118,7 @@ fn read_rig(node: &Node, folder: &Path) -> Result<Rig, Error> {
 }
 
 /// Joints that have to be given, as many as the rig has where the scene names one.
-fn joints(fields: &Fields, key: &str, rig: Option<&Rig>) -> Result<Vec<f64>, Error> {
+pub(super) fn joints(fields: &Fields, key: &str, rig: Option<&Rig>) -> Result<Vec<f64>, Error> {
     let field =
         fields.field(key).ok_or_else(|| fields.error(format!("has no `{key}` (one number per joint, rad or m)")))?;
     let found = field.value.any_numbers()?;
@@ -141,17 +148,24 @@ fn read_execution(node: &Node) -> Result<Execution, Error> {
         share: fields.optional("share", Node::not_negative)?.unwrap_or(default.share),
         dead_band: fields.optional("dead_band", Node::not_negative)?.unwrap_or(default.dead_band),
         gain: fields.optional("gain", Node::any_numbers)?.unwrap_or(default.gain),
+        couplings: Vec::new(),
     })
 }
 
 fn read_tracker(fields: &Fields) -> Result<(Tracker, f64), Error> {
     let sd = fields.optional("sd", Node::not_negative)?;
+    let at = fields.optional("at", Node::positive)?;
     let kind = fields.optional("kind", |node| node.word("tracker", &["exact", "rounded", "gaussian"], |name| name))?;
-    let tracker = match (kind, sd) {
-        (Some("gaussian"), None) => return Err(fields.error("is gaussian and has no `sd` (px)")),
-        (Some("gaussian") | None, Some(sd)) => Tracker::Gaussian(sd),
-        (Some(kind), Some(_)) => return Err(fields.error(format!("is {kind}, and `sd` is for gaussian ones"))),
-        (Some("rounded"), None) => Tracker::Rounded,
+    let tracker = match (kind, sd, at) {
+        (None | Some("gaussian"), Some(sd), Some(at)) => Tracker::ByDistance { sd, at },
+        (None | Some("gaussian"), Some(sd), None) => Tracker::Gaussian(sd),
+        (Some("gaussian"), None, _) => return Err(fields.error("is gaussian and has no `sd` (px)")),
+        (None, None, Some(_)) => {
+            return Err(fields.error("has `at` (m), the distance of its `sd`, and no `sd` (px)"));
+        }
+        (Some(kind), Some(_), _) => return Err(fields.error(format!("is {kind}, and `sd` is for gaussian ones"))),
+        (Some(kind), None, Some(_)) => return Err(fields.error(format!("is {kind}, and `at` is for gaussian ones"))),
+        (Some("rounded"), None, None) => Tracker::Rounded,
         _ => Tracker::Exact,
     };
     let missed = fields.optional("missed", |node| {

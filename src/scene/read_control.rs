@@ -2,26 +2,38 @@
 use super::{Control, UncalibratedControl};
 use crate::Error;
 use crate::rig::read::document::{Fields, Node};
+use crate::servo::uncalibrated::Settings;
 use crate::servo::{Gain, ImageSettings, InteractionMatrix, PoseSettings};
 
 /// The words for controllers.
 const KINDS: &[&str] = &["model-based", "model-based-tip", "image-based", "pose-based", "uncalibrated", "hybrid"];
 
-/// The table `controller` of a scene.
-pub(super) fn read_control(node: Node) -> Result<Control, Error> {
-    let fields = node.table(&["kind", "speed", "matrix", "gain", "infer_joints", "pixels"])?.labelled("controller");
-    let kind = fields.optional("kind", |node| node.word("controller", KINDS, |name| name))?.unwrap_or(KINDS[0]);
+/// The table `controller` of a scene with or without a task.
+pub(super) fn read_control(node: Node, has_task: bool) -> Result<Control, Error> {
+    let fields =
+        node.table(&["kind", "speed", "matrix", "gain", "infer_joints", "pixels", "dead_band"])?.labelled("controller");
+    let kind = fields.optional("kind", |node| node.word("controller", KINDS, |name| name))?.unwrap_or(if has_task {
+        "uncalibrated"
+    } else {
+        KINDS[0]
+    });
     let is_visual = kind == "image-based" || kind == "pose-based";
     if kind != "model-based-tip" && fields.field("speed").is_some() {
         return Err(fields.error("`speed` ([m/s, rad/s]) is for model-based-tip; others take [limits]"));
     }
+    if has_task && kind != "uncalibrated" {
+        return Err(fields.error(format!("a task is carried out by `kind = \"uncalibrated\"`, this is {kind}")));
+    }
+    if let (true, Some(field)) = (has_task, fields.field("pixels")) {
+        return Err(field.value.error("is `noise = { pixels = ... }` of the task, in a scene that has one"));
+    }
     if kind == "uncalibrated" || kind == "hybrid" {
         return read_uncalibrated(&fields, kind == "hybrid").map(Control::Uncalibrated);
     }
-    if fields.field("pixels").is_some() {
-        return Err(
-            fields.error(format!("`pixels` (noise of the trackers) is for uncalibrated and hybrid, this is {kind}"))
-        );
+    for (key, what) in [("pixels", "noise of the trackers"), ("dead_band", "of the robot's joints")] {
+        if fields.field(key).is_some() {
+            return Err(fields.error(format!("`{key}` ({what}) is for uncalibrated and hybrid, this is {kind}")));
+        }
     }
     if let Some(key) = ["matrix", "gain", "infer_joints"].iter().find(|key| !is_visual && fields.field(key).is_some()) {
         return Err(fields.error(format!("`{key}` is for image-based and pose-based, this is {kind}")));
@@ -50,9 +62,12 @@ fn read_uncalibrated(fields: &Fields<'_>, hybrid: bool) -> Result<UncalibratedCo
         return Err(fields.error(format!("`{key}` is for image-based and pose-based")));
     }
     let default = UncalibratedControl::default();
+    let settings = if hybrid { Settings::with_rig() } else { Settings::default() };
+    let gain = fields.optional("gain", read_share)?.unwrap_or(settings.gain);
     Ok(UncalibratedControl {
         pixels: fields.optional("pixels", Node::positive)?.unwrap_or(default.pixels),
-        gain: fields.optional("gain", read_share)?,
+        settings: Settings { gain, ..settings },
+        dead_band: fields.optional("dead_band", Node::not_negative)?.unwrap_or(default.dead_band),
         hybrid,
     })
 }

@@ -1,8 +1,8 @@
-//! Reading which trackers of a scene fail.
+//! Reading which trackers of a scene fail, and which of its joints slip or are dragged along.
 use crate::Error;
 use crate::rig::Rig;
 use crate::rig::read::document::{Fields, Node};
-use crate::simulate::world::{Fault, FaultKind};
+use crate::simulate::world::{Coupling, Fault, FaultKind, Slip};
 
 /// A tracker that fails, by the names of the world's rig.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,6 +33,84 @@ impl NamedFault {
         let [from, until] = self.span;
         Ok(Fault { camera, feature, kind: self.kind, from, until })
     }
+}
+
+/// A joint that slips, by its name in the world's rig.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedSlip {
+    /// Name of the joint.
+    pub joint: String,
+    /// How far its link jumps [rad or m].
+    pub by: f64,
+    /// When [s].
+    pub at: f64,
+}
+
+impl NamedSlip {
+    /// The same by the rig's index.
+    ///
+    /// Errors: [`Error::Unusable`] where the rig has no such joint.
+    pub(super) fn of(&self, rig: &Rig) -> Result<Slip, Error> {
+        let joint = joint_of(rig, "slips", &self.joint)?;
+        Ok(Slip { joint, by: self.by, at: self.at })
+    }
+}
+
+/// A joint that another drags along, by their names in the world's rig.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedCoupling {
+    /// Name of the joint that is dragged along.
+    pub joint: String,
+    /// Name of the joint that does so.
+    pub by: String,
+    /// Motion of the one over that of the other.
+    pub share: f64,
+}
+
+impl NamedCoupling {
+    /// The same by the rig's indices.
+    ///
+    /// Errors: [`Error::Unusable`] where the rig has no such joint.
+    pub(super) fn of(&self, rig: &Rig) -> Result<Coupling, Error> {
+        let find = |name: &String| joint_of(rig, "couplings", name);
+        Ok(Coupling { joint: find(&self.joint)?, by: find(&self.by)?, share: self.share })
+    }
+}
+
+fn joint_of(rig: &Rig, key: &str, name: &String) -> Result<usize, Error> {
+    let found = rig.robot.joints.iter().position(|joint| joint.name == *name);
+    found.ok_or_else(|| {
+        Error::Unusable(format!("`{key}` of the scene's robot names joint `{name}`, which its rig has not"))
+    })
+}
+
+/// The list `couplings` of the table `robot`.
+pub(super) fn read_couplings(fields: &Fields) -> Result<Vec<NamedCoupling>, Error> {
+    let read = |entry: Node| {
+        let fields = entry.table(&["joint", "by", "share"])?.labelled("couplings");
+        let need = |key: &str| fields.field(key).ok_or_else(|| fields.error(format!("has no `{key}`")));
+        Ok(NamedCoupling {
+            joint: need("joint")?.value.text()?.to_owned(),
+            by: need("by")?.value.text()?.to_owned(),
+            share: need("share")?.value.number()?,
+        })
+    };
+    fields.optional("couplings", Node::list)?.unwrap_or_default().into_iter().map(read).collect()
+}
+
+/// The list `slips` of the table `robot`.
+pub(super) fn read_slips(fields: &Fields) -> Result<Vec<NamedSlip>, Error> {
+    fields.optional("slips", Node::list)?.unwrap_or_default().into_iter().map(read_slip).collect()
+}
+
+fn read_slip(entry: Node) -> Result<NamedSlip, Error> {
+    let fields = entry.table(&["joint", "by", "at"])?.labelled("slips");
+    let need = |key: &str| fields.field(key).ok_or_else(|| fields.error(format!("has no `{key}`")));
+    Ok(NamedSlip {
+        joint: need("joint")?.value.text()?.to_owned(),
+        by: need("by")?.value.number()?,
+        at: fields.optional("at", Node::not_negative)?.unwrap_or(0.0),
+    })
 }
 
 /// The list `faults` of the table `tracker`.

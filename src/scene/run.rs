@@ -1,16 +1,15 @@
 //! Running a scene.
+use super::place::Setting;
 use super::{Control, LimitKind, Scene, UncalibratedControl};
 use crate::Error;
 use crate::infer::{Names, Sighting};
 use crate::recording::{Detection, Recording, Sample};
-use crate::rig::Rig;
+use crate::rig::{Parent, Rig};
 use crate::servo::limits::{HalfSpace, InImage, PixelSpeed, TipBox, TipSpeed, VirtualFixture};
-use crate::servo::uncalibrated::Settings;
 use crate::servo::{
     Active, Command, Constraint, Controller, ImageBased, Limit, Measurement, ModelBased, ModelBasedTip, PoseBased,
-    ServoLoop, Stop, Takes, UncalibratedJoints,
+    ServoLoop, Stop, Takes, UncalibratedJoints, UncalibratedTask,
 };
-use crate::simulate::world::World;
 use handeye_solvers::Pose;
 use std::ops::ControlFlow;
 
@@ -34,15 +33,17 @@ pub struct Run {
 pub struct Moment {
     /// Seconds since the beginning.
     pub time: f64,
-    /// Mean pixel distance of the features from the goal as the loop sees it [px]; `None` where none is seen.
+    /// Mean pixel distance of the features from the goal as the loop sees it [px], of a task the root of the mean square of its rows; `None`
+    /// where none is seen.
     pub error_px: Option<f64>,
-    /// Mean distance in space of what moves (features on the arm, cameras on it) from where it shall be, in truth [m].
+    /// Mean distance in space of what moves (features on the arm, cameras on it) from where it shall be, in truth [m]; of a task, from where
+    /// the scene's target has it, which is one of the places that solve it.
     pub error_m: f64,
     /// Where the joints truly are [rad or m].
     pub joints: Vec<f64>,
     /// What is seen.
     pub pixels: Vec<Detection>,
-    /// What is aimed at.
+    /// What is aimed at; of a task, where what is on the hand would be seen.
     pub goal: Vec<Detection>,
     /// What holds the motion back.
     pub active: Vec<Active>,
@@ -65,8 +66,8 @@ pub fn run(
     watch: &mut dyn FnMut(&Moment) -> ControlFlow<()>,
 ) -> Result<Run, Error> {
     let default = match known {
-        Some(_) => Control::ModelBased,
-        None => Control::Uncalibrated(UncalibratedControl::default()),
+        Some(_) if scene.task.is_none() => Control::ModelBased,
+        _ => Control::Uncalibrated(UncalibratedControl::default()),
     };
     let control = scene.control.clone().unwrap_or(default);
     let (learned, known) = match (known, &scene.rig) {
@@ -76,7 +77,18 @@ pub fn run(
             return Err(Error::Unusable("the scene names no `rig`, so there is no world: give one".to_owned()));
         }
     };
-    run_with(scene.controller(&control, learned, known)?, known, scene, watch)
+    let truth = scene.rig.as_ref().unwrap_or(known);
+    check(truth, known, scene)?;
+    let is_fine = matches!(control, Control::Uncalibrated(UncalibratedControl { hybrid: false, .. }));
+    if scene.task.is_some() && !is_fine {
+        let name = control.name();
+        return Err(Error::Unusable(format!(
+            "a task is carried out by a controller of kind uncalibrated, this is {name}"
+        )));
+    }
+    // What does not fit is said of the world before it is of the controller.
+    let setting = Setting::new(scene, truth, known)?;
+    run_in(setting, scene.controller(&control, learned, known)?, known, scene, watch)
 }
 
 fn needs_rig(controller: &str) -> Error {
@@ -85,37 +97,33 @@ fn needs_rig(controller: &str) -> Error {
     ))
 }
 
-fn run_with(
+fn run_in(
+    mut setting: Setting,
     controller: Box<dyn Controller>,
     known: &Rig,
     scene: &Scene,
     watch: &mut dyn FnMut(&Moment) -> ControlFlow<()>,
 ) -> Result<Run, Error> {
-    let truth = scene.rig.as_ref().unwrap_or(known);
-    check(truth, known, scene)?;
-    let mut options = scene.world.clone();
-    for fault in &scene.faults {
-        options.faults.push(fault.of(truth)?);
-    }
-    let mut world = World::new(truth, &scene.start, options)?;
-    let names = Names::new(known, world.header());
+    let names = Names::new(&setting.names, setting.header());
     let (limit_names, limits): (Vec<String>, Vec<Box<dyn Limit>>) = scene.limits(known).into_iter().unzip();
     let limits: Vec<&dyn Limit> = limits.iter().map(|limit| &**limit as &dyn Limit).collect();
     let mut servo = ServoLoop::new(controller, scene.settings);
     let (mut moments, mut commands) = (Vec::new(), 0);
     loop {
-        let target = scene.target.at(world.time());
-        let goal = world.exact(&target);
-        servo.aim(&sightings(&names, &goal));
+        let (goal, error_m) = setting.aim(scene);
+        if scene.task.is_none() {
+            servo.aim(&sightings(&names, &goal));
+        }
+        let world = &mut setting.world;
         let sample = world.look();
-        let seen = names.sightings(&sample);
+        let (seen, points) = (names.sightings(&sample), names.points(&sample));
         let readings = sample.joints.as_deref().unwrap_or_default();
-        let now = Measurement { time: sample.time.unwrap_or(f64::NAN), joints: readings, seen: &seen };
+        let now = Measurement { time: sample.time.unwrap_or(f64::NAN), joints: readings, seen: &seen, points: &points };
         let tick = servo.tick(world.time(), &now, &limits, scene.dt)?;
         let moment = Moment {
             time: world.time(),
             error_px: tick.error_px,
-            error_m: world.distance(&target),
+            error_m,
             joints: world.joints().to_vec(),
             pixels: sample.pixels,
             goal,
@@ -161,19 +169,21 @@ fn check(truth: &Rig, known: &Rig, scene: &Scene) -> Result<(), Error> {
             camera.name
         )));
     }
+    if let (Some(_), Some((limit, _))) = (&scene.task, scene.limits.first()) {
+        return Err(Error::Unusable(format!("limit `{limit}` needs a rig, and a task is carried out without one")));
+    }
     let execution = &scene.world.execution;
     let moves_tip = matches!(scene.takes, Takes::PoseDelta | Takes::PoseVelocity);
     let without_effect = [
-        ("pose", execution.pose.is_noisy() && !moves_tip),
-        ("joints", execution.joints > 0.0 && moves_tip),
-        ("dead_band", execution.dead_band > 0.0 && moves_tip),
-        ("gain", !execution.gain.is_empty() && moves_tip),
+        ("`pose` of the scene's `execution`", execution.pose.is_noisy() && !moves_tip),
+        ("`joints` of the scene's `execution`", execution.joints > 0.0 && moves_tip),
+        ("`dead_band` of the scene's `execution`", execution.dead_band > 0.0 && moves_tip),
+        ("`gain` of the scene's `execution`", !execution.gain.is_empty() && moves_tip),
+        ("`couplings` of the scene's robot", !scene.couplings.is_empty() && moves_tip),
     ];
-    if let Some((key, _)) = without_effect.iter().find(|(_, is_idle)| *is_idle) {
+    if let Some((what, _)) = without_effect.iter().find(|(_, is_idle)| *is_idle) {
         let takes = scene.takes.name();
-        return Err(Error::Unusable(format!(
-            "`{key}` of the scene's `execution` has no effect on a robot that takes {takes}"
-        )));
+        return Err(Error::Unusable(format!("{what} has no effect on a robot that takes {takes}")));
     }
     let (timeout, dt) = (scene.settings.timeout, scene.dt);
     if !(dt > 0.0 && dt.is_finite()) {
@@ -229,21 +239,34 @@ impl Scene {
                 controller.takes = takes;
                 Box::new(controller)
             }
+            Control::Uncalibrated(control) if self.task.is_some() => {
+                let Some(task) = self.task.clone() else { return Err(needs_rig(name)) };
+                let truth = self.rig.as_ref().unwrap_or(known);
+                let mut controller = UncalibratedTask::new(task, takes, &truth.robot.joints, control.settings.clone())?;
+                controller.dead_band(control.dead_band)?;
+                // What anybody sees who looks at the robot.
+                let is_carried = |name: &String| {
+                    truth.cameras.iter().any(|camera| camera.name == *name && camera.parent != Parent::World)
+                };
+                let cameras = self.task.iter().flat_map(|task| task.cameras());
+                controller.carried = cameras.map(is_carried).collect();
+                Box::new(controller)
+            }
             Control::Uncalibrated(_) if moves_tip => {
                 return Err(Error::Unusable(format!(
                     "a controller of kind {name} moves joints, this robot takes {}",
                     takes.name()
                 )));
             }
-            Control::Uncalibrated(UncalibratedControl { pixels, gain, hybrid }) => {
-                let settings = if *hybrid { Settings::with_rig() } else { Settings::default() };
-                let settings = Settings { gain: gain.unwrap_or(settings.gain), ..settings };
+            Control::Uncalibrated(UncalibratedControl { pixels, settings, dead_band, hybrid }) => {
+                let settings = settings.clone();
                 let mut controller = if *hybrid {
                     UncalibratedJoints::with_rig(rig()?, *pixels, settings)?
                 } else {
                     UncalibratedJoints::new(&known.robot.joints, *pixels, settings)?
                 };
                 controller.takes = takes;
+                controller.dead_bands(&vec![*dead_band; known.robot.joints.len()])?;
                 Box::new(controller)
             }
         })

@@ -1,7 +1,7 @@
 //! What a closed loop asks of a controller.
 use super::{Active, Arm, Configuration, Constraint, Limit, Step, Stop, Takes};
 use crate::Error;
-use crate::infer::Sighting;
+use crate::infer::{PointSighting, Sighting};
 use crate::recording::Command;
 
 /// What was read and seen at a moment.
@@ -13,6 +13,8 @@ pub struct Measurement<'a> {
     pub joints: &'a [f64],
     /// Features in images.
     pub seen: &'a [Sighting],
+    /// Features in the frames of depth cameras.
+    pub points: &'a [PointSighting],
 }
 
 /// A command, and what holds it back.
@@ -64,8 +66,27 @@ pub trait Controller {
     /// any other error ends it.
     fn decide(&mut self, now: &Measurement<'_>, limits: &[&dyn Limit], dt: f64) -> Result<Decision, Error>;
 
+    /// The error that the loop judges [px]: the mean distance of the features that are seen and believed from where they shall be, unless
+    /// the controller aims at something else; `None` where nothing of it is seen.
+    fn error_px(&self, now: &Measurement<'_>, goal: &[Sighting], left_out: &[(usize, usize)]) -> Option<f64> {
+        mean_distance(now.seen, goal, left_out)
+    }
+
     /// Told when the robot is held in place of a command: it stands still from now on.
     fn held(&mut self) {}
+}
+
+/// Mean distance of features from where they shall be, over those that are seen and not left out [px]; `None` where there is none.
+pub(super) fn mean_distance(seen: &[Sighting], goal: &[Sighting], left_out: &[(usize, usize)]) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0);
+    for target in goal.iter().filter(|target| !left_out.contains(&(target.camera, target.feature))) {
+        let same = |seen: &&Sighting| (seen.camera, seen.feature) == (target.camera, target.feature);
+        if let Some(seen) = seen.iter().find(same) {
+            sum += (seen.pixel[0] - target.pixel[0]).hypot(seen.pixel[1] - target.pixel[1]);
+            count += 1;
+        }
+    }
+    (count > 0).then(|| sum / f64::from(count))
 }
 
 impl<C: Controller + ?Sized> Controller for Box<C> {
@@ -75,6 +96,10 @@ impl<C: Controller + ?Sized> Controller for Box<C> {
 
     fn decide(&mut self, now: &Measurement<'_>, limits: &[&dyn Limit], dt: f64) -> Result<Decision, Error> {
         (**self).decide(now, limits, dt)
+    }
+
+    fn error_px(&self, now: &Measurement<'_>, goal: &[Sighting], left_out: &[(usize, usize)]) -> Option<f64> {
+        (**self).error_px(now, goal, left_out)
     }
 
     fn held(&mut self) {

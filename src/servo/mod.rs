@@ -26,10 +26,12 @@ mod servo_loop;
 mod step;
 mod stop;
 mod takes;
+mod target_watch;
 pub mod tasks;
 mod tracker_watch;
 pub mod uncalibrated;
 mod uncalibrated_joints;
+mod uncalibrated_task;
 
 pub use crate::recording::Command;
 pub use approach::stretched;
@@ -52,3 +54,4 @@ pub use stop::Stop;
 pub use takes::Takes;
 pub use tasks::Task;
 pub use uncalibrated_joints::UncalibratedJoints;
+pub use uncalibrated_task::UncalibratedTask;

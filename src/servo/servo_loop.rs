@@ -1,8 +1,8 @@
 //! A closed loop around a controller: what to do with each measurement, and when and why to stop.
-use super::controller::{Controller, Decision, Measurement};
+use super::controller::{Controller, Decision, Measurement, mean_distance};
 use super::{Active, Bound, Constraint, Limit, Stop};
 use crate::Error;
-use crate::infer::Sighting;
+use crate::infer::{PointSighting, Sighting};
 use crate::recording::Command;
 use std::collections::VecDeque;
 
@@ -123,7 +123,7 @@ impl<C: Controller> ServoLoop<C> {
         if self.goal == goal {
             return;
         }
-        let moved = self.error(goal).unwrap_or(0.0);
+        let moved = mean_distance(goal, &self.goal, &self.left_out).unwrap_or(0.0);
         self.goal = goal.to_vec();
         self.controller.aim(goal);
         self.errors.clear();
@@ -159,7 +159,11 @@ impl<C: Controller> ServoLoop<C> {
             .filter(|seen| seen.pixel.iter().all(|number| number.is_finite()))
             .copied()
             .collect();
-        let error_px = self.error(&seen);
+        let is_point = |seen: &&PointSighting| seen.point.iter().all(|number| number.is_finite());
+        let points: Vec<PointSighting> = measurement.points.iter().filter(is_point).copied().collect();
+        let readable = if measurement.joints.iter().all(|joint| joint.is_finite()) { measurement.joints } else { &[] };
+        let usable = Measurement { time: measurement.time, joints: readable, seen: &seen, points: &points };
+        let error_px = self.controller.error_px(&usable, &self.goal, &self.left_out);
         let elapsed = now - began;
         if self.stop.is_none() && (elapsed.is_nan() || elapsed >= self.settings.timeout) {
             self.stop = Some(Stop::TimedOut { error_px, seconds: elapsed });
@@ -186,8 +190,6 @@ impl<C: Controller> ServoLoop<C> {
         if self.stop.is_some() {
             return Ok(self.hold(error_px, None));
         }
-        let readable = if measurement.joints.iter().all(|joint| joint.is_finite()) { measurement.joints } else { &[] };
-        let usable = Measurement { time: measurement.time, joints: readable, seen: &seen };
         let decision = match self.controller.decide(&usable, limits, dt) {
             Ok(decision) if decision.command.is_finite() => decision,
             Ok(_) => return Ok(self.wait(now, error_px, "the motion would not have been finite".to_owned())),
@@ -211,24 +213,12 @@ impl<C: Controller> ServoLoop<C> {
         Ok(Tick { command, error_px, active, conflict, waits: None, stop: None })
     }
 
-    /// Mean distance of the features that are seen from where they shall be [px].
-    fn error(&self, seen: &[Sighting]) -> Option<f64> {
-        let (mut sum, mut count) = (0.0, 0);
-        let believed = |target: &&Sighting| !self.left_out.contains(&(target.camera, target.feature));
-        for target in self.goal.iter().filter(believed) {
-            let same = |seen: &&Sighting| (seen.camera, seen.feature) == (target.camera, target.feature);
-            if let Some(seen) = seen.iter().find(same) {
-                sum += (seen.pixel[0] - target.pixel[0]).hypot(seen.pixel[1] - target.pixel[1]);
-                count += 1;
-            }
-        }
-        (count > 0).then(|| sum / f64::from(count))
-    }
-
     /// Whether the error alone says that the loop is to stop.
     fn judge(&mut self, error: f64) {
         let settings = &self.settings;
-        let baseline = *self.baseline_px.get_or_insert(error);
+        // How far a target has gone that nobody aims at, but the controller sees itself, is not known here.
+        let unknown = settings.follow && self.goal.is_empty();
+        let baseline = *self.baseline_px.get_or_insert(if unknown { f64::INFINITY } else { error });
         let in_a_row = |so_far: usize, again: bool| if again { so_far + 1 } else { 0 };
         self.n_settled = in_a_row(self.n_settled, error <= settings.tolerance_px);
         self.n_diverged = in_a_row(self.n_diverged, error > settings.diverged * baseline.max(settings.tolerance_px));

@@ -234,7 +234,7 @@ fn what_is_wrong_with_a_scene_is_said_with_its_place_and_what_would_do() {
     let (_, complaint) = folder.expect(2, "servo ur5 nowhere");
     assert!(
         complaint
-            .contains("nowhere: neither a scene file nor a shipped scene (known: ur5-reach, ur5-visual, ur5-noisy, ur5-uncalibrated)"),
+            .contains("nowhere: neither a scene file nor a shipped scene (known: ur5-reach, ur5-visual, ur5-noisy, ur5-uncalibrated, ur5-wrench, ur5-moving)"),
         "{complaint}"
     );
     assert_eq!(folder.names(), ["scene.toml"], "a failed run writes nothing");

@@ -39,7 +39,7 @@ pub fn run<C: Controller>(
     loop {
         let sample = world.look();
         let (joints, seen) = (sample.joints.clone().unwrap_or_default(), names.sightings(&sample));
-        let now = Measurement { time: sample.time.unwrap(), joints: &joints, seen: &seen };
+        let now = Measurement { time: sample.time.unwrap(), joints: &joints, seen: &seen, points: &[] };
         let tick = servo.tick(world.time(), &now, limits, 1.0)?;
         if let Some(stop) = tick.stop {
             assert_eq!(tick.command, Command::Hold, "a loop that has stopped holds the robot");
@@ -254,7 +254,7 @@ fn nothing_moves_on_useless_measurements_and_the_loop_is_lost_in_the_end() {
         for tick in 0..7 {
             // The clock of the second case has gone on before the first tick.
             let now = 10.0 + f64::from(tick);
-            let measured = Measurement { time: dated(now), joints: start, seen };
+            let measured = Measurement { time: dated(now), joints: start, seen, points: &[] };
             let tick = servo.tick(now, &measured, &[], 1.0).unwrap();
             assert_eq!(tick.command, Command::Hold);
             stop = tick.stop;
@@ -265,7 +265,7 @@ fn nothing_moves_on_useless_measurements_and_the_loop_is_lost_in_the_end() {
     // Readings that are no numbers are as good as none.
     let mut servo = ServoLoop::new(ModelBased::new(&rig).unwrap(), settings());
     servo.aim(&aimed_at);
-    let measured = Measurement { time: 0.0, joints: &[f64::NAN; 6], seen: &seen };
+    let measured = Measurement { time: 0.0, joints: &[f64::NAN; 6], seen: &seen, points: &[] };
     let tick = servo.tick(0.0, &measured, &[], 1.0).unwrap();
     let Command::JointDelta(motion) = &tick.command else { panic!("{tick:?}") };
     assert!(motion.iter().all(|motion| motion.is_finite()));
@@ -288,7 +288,7 @@ fn a_target_that_moves_is_followed_at_the_distance_of_one_step() {
             servo.aim(&goal(&world, &names, &place(step)));
             let sample = world.look();
             let (joints, seen) = (sample.joints.clone().unwrap(), names.sightings(&sample));
-            let now = Measurement { time: sample.time.unwrap(), joints: &joints, seen: &seen };
+            let now = Measurement { time: sample.time.unwrap(), joints: &joints, seen: &seen, points: &[] };
             let tick = servo.tick(world.time(), &now, &[], 1.0).unwrap();
             assert_eq!(tick.stop, None);
             world.execute(&tick.command, 1.0).unwrap();

@@ -33,7 +33,8 @@ fn a_loop_that_never_moves_is_lost_and_not_as_good_as_it_can_be() {
         let mut servo = ServoLoop::new(controller, settings());
         servo.aim(&aimed_at);
         let ticks = (0..60).map(|tick| 0.1 * f64::from(tick));
-        let stops = ticks.map(|now| servo.tick(now, &Measurement { time: now, joints: start, seen: &seen }, &[], 0.1));
+        let stops = ticks
+            .map(|now| servo.tick(now, &Measurement { time: now, joints: start, seen: &seen, points: &[] }, &[], 0.1));
         let last: Tick = stops.map(Result::unwrap).last().unwrap();
         assert!(matches!(last.stop, Some(Stop::Lost { .. })), "{last:?}");
     }
@@ -48,7 +49,9 @@ fn one_measurement_that_is_seen_again_and_again_is_one() {
     let settings = LoopSettings { settled: 2, look_then_move: false, ..settings() };
     let mut servo = ServoLoop::new(Stubborn(None, 0.0), settings);
     servo.aim(&seen);
-    let mut tick = |now: f64, time: f64| servo.tick(now, &Measurement { time, joints: start, seen: &seen }, &[], 0.001);
+    let mut tick = |now: f64, time: f64| {
+        servo.tick(now, &Measurement { time, joints: start, seen: &seen, points: &[] }, &[], 0.001)
+    };
     for millisecond in 0..30 {
         assert_eq!(tick(0.001 * f64::from(millisecond), 0.0).unwrap().stop, None);
     }
@@ -70,7 +73,7 @@ fn an_arm_that_runs_away_from_a_target_that_moves_has_diverged_and_one_that_lags
             servo.aim(&goal(&world, &names, &place(f64::from(step))));
             let sample = world.look();
             let seen = names.sightings(&sample);
-            let now = Measurement { time: sample.time.unwrap(), joints: start, seen: &seen };
+            let now = Measurement { time: sample.time.unwrap(), joints: start, seen: &seen, points: &[] };
             let tick = servo.tick(world.time(), &now, &[], 1.0).unwrap();
             stop = stop.or(tick.stop);
             world.execute(&tick.command, 1.0).unwrap();
@@ -96,7 +99,7 @@ fn an_arm_that_waits_for_new_images_stands_still_and_does_not_overshoot() {
         loop {
             let sample = world.look();
             let (joints, seen) = (sample.joints.clone().unwrap(), names.sightings(&sample));
-            let now = Measurement { time: sample.time.unwrap(), joints: &joints, seen: &seen };
+            let now = Measurement { time: sample.time.unwrap(), joints: &joints, seen: &seen, points: &[] };
             let tick = servo.tick(world.time(), &now, &[], 0.1).unwrap();
             world.execute(&tick.command, 0.1).unwrap();
             for ((joint, from), to) in world.joints().iter().zip(start).zip(target) {

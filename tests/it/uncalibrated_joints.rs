@@ -62,7 +62,7 @@ fn run<C: Controller>(world: &mut World, rig: &Rig, controller: C, target: &[f64
             sample = world.look();
         }
         let (joints, seen) = (sample.joints.clone().unwrap_or_default(), names.sightings(&sample));
-        let now = Measurement { time: sample.time.unwrap(), joints: &joints, seen: &seen };
+        let now = Measurement { time: sample.time.unwrap(), joints: &joints, seen: &seen, points: &[] };
         let tick = servo.tick(world.time(), &now, &[], 1.0).unwrap();
         let age = world.time() - now.time;
         assert!(age <= servo.settings.watchdog || tick.command == Command::Hold, "moves on data {age} s old");
@@ -220,7 +220,8 @@ fn a_target_that_moves_keeps_what_was_learned() {
         servo.aim(&goal(&world, &names, &moving));
         let sample = world.look();
         let seen = names.sightings(&sample);
-        let now = Measurement { time: world.time(), joints: sample.joints.as_deref().unwrap(), seen: &seen };
+        let now =
+            Measurement { time: world.time(), joints: sample.joints.as_deref().unwrap(), seen: &seen, points: &[] };
         let tick = servo.tick(world.time(), &now, &[], 1.0).unwrap();
         assert_eq!(tick.stop, None, "step {step}");
         errors.push(tick.error_px.unwrap());
@@ -246,7 +247,8 @@ fn a_loop_that_gave_up_begins_anew_with_another_goal() {
         if controller.phase() == Some(&Phase::Servoing) {
             seen.iter_mut().for_each(|seen| seen.pixel[0] += 200.0);
         }
-        let now = Measurement { time: f64::from(step), joints: sample.joints.as_deref().unwrap(), seen: &seen };
+        let now =
+            Measurement { time: f64::from(step), joints: sample.joints.as_deref().unwrap(), seen: &seen, points: &[] };
         let decision = controller.decide(&now, &[], 1.0).unwrap();
         stop = decision.stop;
         if stop.is_some() {
@@ -270,7 +272,7 @@ fn what_it_cannot_do_is_said() {
     let names = Names::new(&rig, world.header());
     let (sample, aimed_at) = (world.look(), goal(world, &names, &target));
     let seen = names.sightings(&sample);
-    let now = |seen| Measurement { time: 0.0, joints: sample.joints.as_deref().unwrap(), seen };
+    let now = |seen| Measurement { time: 0.0, joints: sample.joints.as_deref().unwrap(), seen, points: &[] };
     let mut controller = none(&rig);
     controller.aim(&aimed_at);
     refused(controller.decide(&now(&seen[..2]), &[], 1.0).unwrap_err(), "2 of the 24 features");

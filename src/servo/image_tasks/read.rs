@@ -23,8 +23,12 @@ impl ImageTask {
     pub fn parse(text: &str, file_name: &str) -> Result<ImageTask, Error> {
         let source = Source { file: file_name, text };
         let document = parse(&source)?;
-        let root =
-            Node::root(&source, document.as_table()).table(&["name", "cameras", "noise", "features", "tasks"])?;
+        ImageTask::of_node(Node::root(&source, document.as_table()))
+    }
+
+    /// A whole task, as a file or as a table of another.
+    pub(crate) fn of_node(node: Node) -> Result<ImageTask, Error> {
+        let root = node.table(&["name", "cameras", "noise", "features", "tasks"])?;
         let listed = root.field("cameras").ok_or_else(|| root.error("has no `cameras` (their names)"))?.value;
         let cameras = read_cameras(&listed)?;
         let features = root.field("features").map(|field| field.value);

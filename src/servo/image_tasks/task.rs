@@ -143,6 +143,18 @@ impl ImageTask {
         pairs.flat_map(|(part, camera)| self.errors_of(part, camera, seen)).collect()
     }
 
+    /// The errors of every row alone, in the order of [`ImageTask::errors`] [px]; NaN likewise.
+    pub fn values(&self, seen: &Seen) -> Vec<f64> {
+        let mut errors = Vec::with_capacity(self.rows());
+        for part in &self.parts {
+            for &camera in &part.cameras {
+                part.kind.errors(&self.places(part, camera, seen), &mut errors);
+            }
+        }
+        errors.iter_mut().filter(|error| !error.is_finite()).for_each(|error| *error = f64::NAN);
+        errors
+    }
+
     /// What [`crate::servo::uncalibrated::Uncalibrated`] is told of the rows; their standard deviations are those at a moment when all of
     /// them are seen.
     ///
@@ -159,21 +171,23 @@ impl ImageTask {
         }
     }
 
+    /// Where the features of a part are seen: homogeneous pixels, or points in the camera's frame [m].
+    fn places(&self, part: &Part, camera: usize, seen: &Seen) -> Vec<Vector3<f64>> {
+        let place = |feature: usize| {
+            if part.kind.is_spatial() {
+                return Vector3::from(at(&seen.points, camera, feature));
+            }
+            let [u, v] = at(&seen.pixels, camera, feature);
+            Vector3::new(u, v, 1.0)
+        };
+        part.kind.features().into_iter().map(place).collect()
+    }
+
     fn errors_of(&self, part: &Part, camera: usize, seen: &Seen) -> Vec<RowError> {
         let features = part.kind.features();
         let (coordinates, noise) =
             if part.kind.is_spatial() { (3, self.trackers.points) } else { (2, self.trackers.pixels) };
-        let values: Vec<Vector3<f64>> = features
-            .iter()
-            .map(|&feature| {
-                if part.kind.is_spatial() {
-                    Vector3::from(at(&seen.points, camera, feature))
-                } else {
-                    let [u, v] = at(&seen.pixels, camera, feature);
-                    Vector3::new(u, v, 1.0)
-                }
-            })
-            .collect();
+        let values = self.places(part, camera, seen);
         let mut errors = Vec::new();
         part.kind.errors(&values, &mut errors);
         // Features that are fixed in the image have no noise.

@@ -1,25 +1,33 @@
-//! Worlds for closed loops: a robot that carries out commands inexactly, cameras and trackers, things to grasp.
+//! Worlds for closed loops: a robot that carries out commands inexactly, cameras and trackers, things to grasp; an arm that a virtual spring
+//! pulls, a drone over a line.
+mod drone;
 mod fault;
 mod object;
 mod robot;
+mod sight;
+mod slip;
+mod spring;
 mod tracker;
 
+pub use drone::Drone;
 pub use fault::{Fault, FaultKind};
 pub use object::Object;
-pub use robot::Execution;
+pub use robot::{Coupling, Execution};
+pub use slip::Slip;
+pub use spring::{Spring, SpringArm, Table};
 pub use tracker::Tracker;
 
 use super::in_natural_order;
 use crate::Error;
-use crate::reach::{pixel_inside, sizes};
-use crate::recording::{Command, Detection, RecordedCamera, Recording, Sample};
-use crate::rig::{Model, ModelFeature, Parent, Rig};
+use crate::reach::sizes;
+use crate::recording::{Command, RecordedCamera, Recording};
+use crate::rig::{Model, Parent, Rig};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::StandardNormal;
 use robot::Robot;
+use sight::in_world;
 use std::collections::VecDeque;
 
 /// How a world differs from its rig.
@@ -27,10 +35,14 @@ use std::collections::VecDeque;
 pub struct WorldOptions {
     /// How the robot errs.
     pub execution: Execution,
+    /// Joints that slip.
+    pub slips: Vec<Slip>,
     /// Standard deviation of joint readings [rad or m]; `None` where the robot gives none.
     pub readings: Option<f64>,
     /// How trackers err.
     pub tracker: Tracker,
+    /// Standard deviation of a coordinate of a point that a depth camera sees [m].
+    pub points: f64,
     /// Trackers that fail at times.
     pub faults: Vec<Fault>,
     /// Probability that a feature in view is not reported, in [0, 1].
@@ -46,8 +58,10 @@ impl Default for WorldOptions {
     fn default() -> Self {
         WorldOptions {
             execution: Execution::default(),
+            slips: Vec::new(),
             readings: Some(0.0),
             tracker: Tracker::Exact,
+            points: 0.0,
             faults: Vec::new(),
             missed: 0.0,
             latency: 0.0,
@@ -60,6 +74,8 @@ impl Default for WorldOptions {
 pub struct World {
     model: Model,
     sizes: Vec<[f64; 2]>,
+    /// Which cameras give points too.
+    depth: Vec<bool>,
     header: Recording,
     /// Of every feature of the rig, its place in the header.
     places: Vec<u32>,
@@ -68,17 +84,30 @@ pub struct World {
     objects: Vec<Object>,
     time: f64,
     joints: Vec<f64>,
-    /// Where the joints and objects were, as long ago as the latency reaches.
-    past: VecDeque<(f64, Vec<f64>, Vec<Object>)>,
+    /// How far each link has slipped from where its joint is read [rad or m].
+    slipped: Vec<f64>,
+    /// How it was, as long ago as the latency reaches.
+    past: VecDeque<Moment>,
     /// What trackers with faults reported last [px], in the order of the faults.
     reported: Vec<Option<[f64; 2]>>,
     executing: ChaCha8Rng,
     observing: ChaCha8Rng,
+    sounding: ChaCha8Rng,
+}
+
+/// What is seen depends on.
+#[derive(Clone)]
+struct Moment {
+    time: f64,
+    joints: Vec<f64>,
+    slipped: Vec<f64>,
+    objects: Vec<Object>,
 }
 
 /// Streams of random numbers, so that what is seen does not change what is done.
 const EXECUTING: u64 = 1;
 const OBSERVING: u64 = 2;
+const SOUNDING: u64 = 3;
 
 impl World {
     /// A complete rig with its joints at these readings [rad or m], at time 0.
@@ -89,12 +118,16 @@ impl World {
         let n = rig.robot.joints.len();
         check_joints(joints, n)?;
         options.execution.check(rig)?;
-        let shares = [options.missed, options.readings.unwrap_or(0.0), options.latency];
+        options.tracker.check()?;
+        let shares = [options.missed, options.readings.unwrap_or(0.0), options.points, options.latency];
         if !(0.0..=1.0).contains(&options.missed) || shares.iter().any(|number| !(0.0..f64::INFINITY).contains(number))
         {
             return Err(Error::Unusable(format!(
-                "`missed` is a share between 0 and 1, noise of readings and latency are 0 or more; found {shares:?}"
+                "`missed` is a share between 0 and 1, noise of readings and points and latency are 0 or more; found {shares:?}"
             )));
+        }
+        if let Some(slip) = options.slips.iter().find(|slip| slip.joint >= n || !slip.by.is_finite()) {
+            return Err(Error::Unusable(format!("{slip:?} is not of a joint of {n}, or not by a finite number")));
         }
         let (features, places) = in_natural_order(rig);
         let stream = |number| {
@@ -104,6 +137,7 @@ impl World {
         };
         Ok(World {
             sizes: sizes(rig)?,
+            depth: rig.cameras.iter().map(|camera| camera.depth).collect(),
             header: Recording {
                 joints: rig.robot.joints.iter().map(|joint| joint.name.clone()).collect(),
                 cameras: rig.cameras.iter().map(RecordedCamera::from).collect(),
@@ -120,10 +154,17 @@ impl World {
             objects: Vec::new(),
             time: 0.0,
             joints: joints.to_vec(),
-            past: VecDeque::from([(0.0, joints.to_vec(), Vec::new())]),
+            slipped: vec![0.0; n],
+            past: VecDeque::from([Moment {
+                time: 0.0,
+                joints: joints.to_vec(),
+                slipped: vec![0.0; n],
+                objects: Vec::new(),
+            }]),
             reported: vec![None; options.faults.len()],
             executing: stream(EXECUTING),
             observing: stream(OBSERVING),
+            sounding: stream(SOUNDING),
             options,
         })
     }
@@ -131,7 +172,7 @@ impl World {
     /// Puts an object into the world, and gives its number.
     pub fn put(&mut self, object: Object) -> usize {
         self.objects.push(object);
-        self.past = VecDeque::from([(self.time, self.joints.clone(), self.objects.clone())]);
+        self.past = VecDeque::from([self.now()]);
         self.objects.len() - 1
     }
 
@@ -141,7 +182,7 @@ impl World {
     pub fn place(&mut self, joints: &[f64]) -> Result<(), Error> {
         check_joints(joints, self.joints.len())?;
         self.joints = joints.to_vec();
-        self.past = VecDeque::from([(self.time, self.joints.clone(), self.objects.clone())]);
+        self.past = VecDeque::from([self.now()]);
         Ok(())
     }
 
@@ -150,6 +191,17 @@ impl World {
         let tip = self.robot.chain.tip(&self.joints);
         if let Some(object) = self.objects.get_mut(object) {
             object.grasp(&tip);
+        }
+    }
+
+    /// Puts an object that is not held elsewhere, as somebody's hand does: where a tip at this pose of the world would hold it as it should
+    /// be held. Nothing happens for an unknown number.
+    pub fn carry(&mut self, object: usize, world_from_tip: Pose) {
+        if let Some(object) = self.objects.get_mut(object) {
+            object.carry(world_from_tip);
+        }
+        if let Some(last) = self.past.back_mut() {
+            last.objects.clone_from(&self.objects);
         }
     }
 
@@ -183,17 +235,38 @@ impl World {
     /// Mean distance of what the joints move (features on the arm, cameras on it) from where it would be at other joints [m]; 0 where
     /// there is none of it.
     pub fn distance(&self, joints: &[f64]) -> f64 {
-        let places = |joints: &[f64]| {
-            let links = self.model.links(joints);
-            let features = self.model.features.iter().filter(|feature| feature.parent != Parent::World);
-            let cameras = self.model.cameras.iter().filter(|camera| camera.parent != Parent::World);
-            let features = features.map(|feature| self.model.carrier(feature.parent, &links).transform(&feature.xyz));
-            let cameras = cameras.map(|camera| (self.model.carrier(camera.parent, &links) * camera.pose).translation);
-            features.chain(cameras).collect::<Vec<_>>()
-        };
-        let (here, there) = (places(&self.joints), places(joints));
-        let sum: f64 = here.iter().zip(&there).map(|(a, b)| (a - b).norm()).sum();
-        sum / here.len().max(1) as f64
+        self.apart(&self.model.links(joints))
+    }
+
+    /// The same of what is fixed to the tip, from where it would be with the tip at another pose of the world.
+    pub fn distance_from_tip(&self, world_from_tip: &Pose) -> f64 {
+        self.apart(&self.links_with_tip(world_from_tip))
+    }
+
+    fn apart(&self, there: &[Pose]) -> f64 {
+        let here = self.model.links(&self.joints);
+        let (features, cameras) = (self.model.features.iter().enumerate(), self.model.cameras.iter());
+        let is_thing = |feature: &usize| self.objects.iter().any(|object| object.features.contains(feature));
+        let features = features
+            .filter(|(index, feature)| feature.parent != Parent::World && !is_thing(index))
+            .map(|(_, feature)| (feature.parent, feature.xyz));
+        let cameras = cameras.filter(|camera| camera.parent != Parent::World);
+        let cameras = cameras.map(|camera| (camera.parent, camera.pose.translation));
+        let place =
+            |parent: Parent, xyz: &Vector3<f64>, links: &[Pose]| self.model.carrier(parent, links).transform(xyz);
+        let (mut sum, mut count) = (0.0, 0);
+        for (parent, xyz) in features.chain(cameras) {
+            sum += (place(parent, &xyz, &here) - place(parent, &xyz, there)).norm();
+            count += 1;
+        }
+        sum / f64::from(count.max(1))
+    }
+
+    /// Links as they are, but for the last, which is elsewhere.
+    fn links_with_tip(&self, world_from_tip: &Pose) -> Vec<Pose> {
+        let mut links = self.model.links(&self.joints);
+        links.last_mut().into_iter().for_each(|tip| *tip = *world_from_tip);
+        links
     }
 
     /// A recording without samples: the names to which those of [`World::look`] refer.
@@ -201,61 +274,40 @@ impl World {
         &self.header
     }
 
-    /// What is read and seen now, with noise; its time is when it was, which latency puts into the past.
-    pub fn look(&mut self) -> Sample {
-        let time = (self.time - self.options.latency).max(0.0);
-        let (joints, objects) = self.then(time);
-        let random = &mut self.observing;
-        let reading =
-            |joint: &f64, sd: f64, random: &mut ChaCha8Rng| joint + sd * random.sample::<f64, _>(StandardNormal);
-        let readings =
-            self.options.readings.map(|sd| joints.iter().map(|joint| reading(joint, sd, random)).collect::<Vec<_>>());
-        let mut pixels = detections(&self.model, &self.sizes, &self.places, &joints, &objects);
-        let (tracker, missed) = (self.options.tracker, self.options.missed);
-        pixels.retain_mut(|detection| {
-            // As many random numbers whatever happens.
-            let is_seen = random.random::<f64>() >= missed;
-            detection.pixel = tracker.report(detection.pixel, random);
-            is_seen
-        });
-        for (fault, reported) in self.options.faults.iter().zip(&mut self.reported) {
-            let Some(&feature) = self.places.get(fault.feature) else { continue };
-            let of_fault = |seen: &Detection| (seen.camera as usize, seen.feature) == (fault.camera, feature);
-            if let Some(at) = pixels.iter().position(of_fault) {
-                match fault.report(pixels[at].pixel, *reported, time) {
-                    Some(pixel) => (pixels[at].pixel, *reported) = (pixel, Some(pixel)),
-                    None => drop(pixels.remove(at)),
-                }
-            }
-        }
-        Sample { time: Some(time), joints: readings, pixels, ..Sample::default() }
-    }
-
-    /// What would be seen at some joints, exactly.
-    pub fn exact(&self, joints: &[f64]) -> Vec<Detection> {
-        detections(&self.model, &self.sizes, &self.places, joints, &self.objects)
-    }
-
     /// Carries out a command, which takes `dt` seconds.
     ///
     /// Errors: [`Error::Unusable`] for a command that is not of this robot or has numbers that are not finite.
     pub fn execute(&mut self, command: &Command, dt: f64) -> Result<(), Error> {
-        self.joints = self.robot.execute(&self.joints, command, dt, &mut self.executing)?;
+        // The robot goes by what it reads.
+        let read: Vec<f64> = self.joints.iter().zip(&self.slipped).map(|(joint, slip)| joint - slip).collect();
+        let after = self.robot.execute(&read, command, dt, &mut self.executing)?;
+        let span = self.time..self.time + dt;
+        for slip in self.options.slips.iter().filter(|slip| span.contains(&slip.at)) {
+            self.slipped[slip.joint] += slip.by;
+        }
+        self.joints = after.iter().zip(&self.slipped).map(|(joint, slip)| joint + slip).collect();
         self.time += dt;
-        self.past.push_back((self.time, self.joints.clone(), self.objects.clone()));
-        while self.past.len() > 2 && self.past[1].0 <= self.time - self.options.latency {
+        self.past.push_back(self.now());
+        while self.past.len() > 2 && self.past[1].time <= self.time - self.options.latency {
             self.past.pop_front();
         }
         Ok(())
     }
 
-    /// Joints and objects at a time that is remembered: commands move the joints evenly.
-    fn then(&self, time: f64) -> (Vec<f64>, Vec<Object>) {
-        let after = self.past.iter().position(|(when, ..)| *when >= time).unwrap_or(self.past.len() - 1);
-        let (t1, j1, objects) = &self.past[after];
-        let (t0, j0, _) = &self.past[after.saturating_sub(1)];
-        let share = if t1 > t0 { ((time - t0) / (t1 - t0)).clamp(0.0, 1.0) } else { 1.0 };
-        (j0.iter().zip(j1).map(|(from, to)| from + share * (to - from)).collect(), objects.clone())
+    fn now(&self) -> Moment {
+        let (joints, slipped, objects) = (self.joints.clone(), self.slipped.clone(), self.objects.clone());
+        Moment { time: self.time, joints, slipped, objects }
+    }
+
+    /// How it was at a time that is remembered: commands move the joints evenly.
+    fn then(&self, time: f64) -> Moment {
+        let after = self.past.iter().position(|moment| moment.time >= time).unwrap_or(self.past.len() - 1);
+        let (to, from) = (&self.past[after], &self.past[after.saturating_sub(1)]);
+        let share =
+            if to.time > from.time { ((time - from.time) / (to.time - from.time)).clamp(0.0, 1.0) } else { 1.0 };
+        let between = |from: &[f64], to: &[f64]| from.iter().zip(to).map(|(a, b)| a + share * (b - a)).collect();
+        let (joints, slipped) = (between(&from.joints, &to.joints), between(&from.slipped, &to.slipped));
+        Moment { time, joints, slipped, objects: to.objects.clone() }
     }
 }
 
@@ -264,29 +316,4 @@ fn check_joints(joints: &[f64], n: usize) -> Result<(), Error> {
         return Err(Error::Unusable(format!("a robot of {n} joints cannot be at {joints:?}")));
     }
     Ok(())
-}
-
-/// Exact pixels of all features in view, in the order of recordings.
-fn detections(model: &Model, sizes: &[[f64; 2]], places: &[u32], joints: &[f64], objects: &[Object]) -> Vec<Detection> {
-    let links = model.links(joints);
-    let in_world: Vec<_> = (0..model.features.len()).map(|feature| in_world(model, feature, &links, objects)).collect();
-    let mut seen = Vec::new();
-    for (index, camera) in model.cameras.iter().enumerate() {
-        let world_from_camera = model.carrier(camera.parent, &links) * camera.pose;
-        for (point, &feature) in in_world.iter().zip(places) {
-            let pixel = pixel_inside(camera, sizes[index], &world_from_camera.inverse_transform(point));
-            seen.extend(pixel.map(|pixel| Detection { camera: index as u32, feature, pixel }));
-        }
-    }
-    seen.sort_unstable_by_key(|detection| (detection.camera, detection.feature));
-    seen
-}
-
-/// Where a feature is, on its link or on its object [m].
-fn in_world(model: &Model, feature: usize, links: &[Pose], objects: &[Object]) -> Vector3<f64> {
-    let object = objects.iter().find(|object| object.features.contains(&feature));
-    let tip = model.carrier(Parent::Tip, links);
-    let ModelFeature { parent, xyz } = &model.features[feature];
-    let carrier = object.map_or_else(|| model.carrier(*parent, links), |object| object.carrier(&tip));
-    carrier.transform(xyz)
 }

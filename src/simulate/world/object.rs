@@ -30,6 +30,13 @@ impl Object {
         }
     }
 
+    /// Puts it elsewhere, unless it is held.
+    pub(super) fn carry(&mut self, world_from_tip: Pose) {
+        if !self.is_held {
+            self.place = world_from_tip;
+        }
+    }
+
     /// True where it moves with the tip.
     pub fn is_held(&self) -> bool {
         self.is_held

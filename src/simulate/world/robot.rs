@@ -24,6 +24,19 @@ pub struct Execution {
     pub dead_band: f64,
     /// Executed over commanded motion, one per joint; empty for exact ones.
     pub gain: Vec<f64>,
+    /// Joints that others drag along.
+    pub couplings: Vec<Coupling>,
+}
+
+/// A joint that another drags along, by a cable or a gear that they share.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coupling {
+    /// Index of the joint that is dragged along.
+    pub joint: usize,
+    /// Index of the joint that does so.
+    pub by: usize,
+    /// Motion of the one over that of the other.
+    pub share: f64,
 }
 
 /// Longest turn [rad] and shift [m] between the poses that the tip passes on its way.
@@ -81,7 +94,11 @@ impl Robot {
             let motion = if motion.abs() < noise.dead_band { &0.0 } else { motion };
             joints[i] + gain * motion + noise.joints * normal() + noise.share * motion * normal()
         });
-        let mut after: Vec<f64> = moved.collect();
+        let moved: Vec<f64> = moved.collect();
+        let mut after = moved.clone();
+        for Coupling { joint, by, share } in &noise.couplings {
+            after[*joint] += share * (moved[*by] - joints[*by]);
+        }
         self.stop_at_ends(&mut after);
         Ok(after)
     }
@@ -147,6 +164,9 @@ impl Execution {
         if !self.gain.is_empty() && self.gain.len() != n {
             let found = self.gain.len();
             return Err(Error::Unusable(format!("{found} gains are given, the robot has {n} joints")));
+        }
+        if let Some(coupling) = self.couplings.iter().find(|c| c.joint >= n || c.by >= n || !c.share.is_finite()) {
+            return Err(Error::Unusable(format!("{coupling:?} is not of joints of {n}, or its share is not finite")));
         }
         let numbers = [self.joints, self.pose.xyz, self.pose.rot, self.share, self.dead_band];
         if numbers.iter().any(|sd| !(0.0..f64::INFINITY).contains(sd)) || self.gain.iter().any(|gain| !gain.is_finite())
