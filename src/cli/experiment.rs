@@ -127,6 +127,7 @@ fn to_json(experiment: &Experiment, options: &Options, outcome: &Outcome) -> Val
     let row = |row: &Row| {
         json!({
             "label": row.label,
+            "panel": row.panel,
             "series": row.series,
             "x": row.x,
             "published": row.published.map(|published| json!({ "mean": published.mean, "sd": published.sd })),

@@ -31,6 +31,7 @@ mod table6;
 mod table7;
 mod table8;
 mod unobserved;
+mod without_rig;
 
 pub use outcome::{Outcome, Published, Row};
 pub use plot::svg;
@@ -89,7 +90,17 @@ pub const ALL: &[Experiment] = &[
     camera_rotation::TABLE5_1,
     camera_rotation::TABLE5_2,
     camera_rotation::TABLE5_3,
+    camera_rotation::FIGURE5_8,
+    camera_rotation::FIGURE5_9,
     camera_rotation::FIGURE5_10,
+    without_rig::FIGURE5_17,
+    without_rig::DEAD_BAND,
+    without_rig::WRENCH,
+    without_rig::PICK,
+    without_rig::DEPTH_CAMERA,
+    without_rig::MOVING_TARGET,
+    without_rig::VIRTUAL_SPRING,
+    without_rig::DRONE,
 ];
 
 /// The experiment of that name.

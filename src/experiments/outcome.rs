@@ -18,6 +18,8 @@ pub struct Outcome {
 /// One figure: its published value, and ours in every trial.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
+    /// Which drawing it belongs to, called by what its figures are; empty where there is only one.
+    pub panel: &'static str,
     /// Which curve or part of the table it belongs to; empty where there is only one.
     pub series: &'static str,
     /// What it is.
@@ -60,12 +62,17 @@ impl Row {
     pub(super) fn new(label: impl Into<String>, published: Option<Published>, results: &[Option<f64>]) -> Row {
         let values: Vec<f64> = results.iter().flatten().copied().collect();
         let failed = results.len() - values.len();
-        Row { series: "", label: label.into(), x: None, published, reconstructed: None, values, failed }
+        Row { panel: "", series: "", label: label.into(), x: None, published, reconstructed: None, values, failed }
     }
 
     /// The same as a point of a curve.
     pub(super) fn at(self, series: &'static str, x: f64) -> Row {
         Row { series, x: Some(x), ..self }
+    }
+
+    /// The same in one of several drawings.
+    pub(super) fn on(self, panel: &'static str) -> Row {
+        Row { panel, ..self }
     }
 
     /// Mean over the trials; `None` without any.

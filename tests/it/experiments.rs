@@ -28,7 +28,17 @@ const PUBLISHED: &[(&str, &[&str])] = &[
     ("table5.1", &["8.151261", "0.00766", "8.900662", "3.088608", "2.945055"]),
     ("table5.2", &["5.264595", "0.003251", "3.16129", "0.000273", "3.145695"]),
     ("table5.3", &["8.868672", "0.006711", "8.769231", "6.246298", "0.003606"]),
+    ("figure5.8", &["the higher the condition number, the longer"]),
+    ("figure5.9", &["the higher the condition number, the longer"]),
     ("figure5.10", &["where the cameras are orthogonal", "where they overlap"]),
+    ("figure5.17", &["1.792", "0.0737 mm and 0.1321 mm", "diverges at 0.6 m with 0.3 px"]),
+    ("dead-band", &["TOL/λ", "0.1 to 0.2 mm on a WAM"]),
+    ("wrench", &["an unexpected solution"]),
+    ("pick-alignment", &["precise enough to finalise the grasp"]),
+    ("depth-camera", &["calibrate the sensor against the robot"]),
+    ("moving-target", &["by touch and by gestures"]),
+    ("virtual-spring", &["contacts between a solid table and the robot"]),
+    ("drone", &["the pilot takes roll, pitch and elevation"]),
 ];
 
 fn run(name: &str, trials: usize) -> Outcome {

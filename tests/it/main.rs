@@ -54,5 +54,6 @@ mod urdf_out;
 mod visual_servo;
 mod visual_servo_rough;
 mod weak;
+mod without_rig;
 mod worlds;
 mod wrong_data;

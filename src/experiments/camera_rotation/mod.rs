@@ -1,5 +1,6 @@
 //! The camera rotation experiment of Ramirez, "Towards Practical Uncalibrated Visual Servoing", 2016, section 5.2: a Puma 560 brings three
 //! points of its tool to where two cameras shall see them, and the cameras are carried around the target.
+mod around;
 mod baseline;
 mod published;
 mod run;
@@ -9,5 +10,6 @@ mod world;
 pub use run::{Run, carried_around, serve};
 pub use world::{Scene, Tracker, View, World};
 
+pub(super) use around::{FIGURE5_8, FIGURE5_9};
 pub(super) use baseline::FIGURE5_10;
 pub(super) use tables::{TABLE5_1, TABLE5_2, TABLE5_3};

@@ -1,8 +1,8 @@
 //! One servo run in the scene, and runs around the target.
 use super::world::{Scene, Tracker, View, World};
 use crate::Error;
-use crate::servo::LimitRows;
-use crate::servo::uncalibrated::{Phase, Settings, Stop, Uncalibrated};
+use crate::experiments::without_rig::controlled::{self, Course};
+use crate::servo::uncalibrated::{Settings, Stop};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
@@ -41,31 +41,8 @@ impl Run {
 ///
 /// Errors: what [`Uncalibrated::new`] refuses.
 pub fn serve(world: &mut World, settings: &Settings) -> Result<Run, Error> {
-    let mut servo = Uncalibrated::new(world.quantities(), world.rows(), settings.clone())?;
-    let mut limits = LimitRows::default();
-    limits.clear(world.joints().len());
-    let mut run = Run { errors: Vec::new(), error_3d: 0.0, condition: None, stop: None };
-    while run.errors.len() <= ITERATIONS {
-        let (errors, joints) = (world.errors(), world.joints().to_vec());
-        let command = servo.step(&joints, &errors, &limits, 1.0)?;
-        let (motion, phase) = (command.motion.to_vec(), command.phase.clone());
-        if phase != Phase::Exploring {
-            if let (true, Some(estimate)) = (run.errors.is_empty(), servo.estimate()) {
-                run.condition = Some(estimate.condition());
-            }
-            run.errors.push(errors.iter().map(|error| error.abs()).sum());
-        }
-        if let Phase::Stopped(stop) = phase {
-            run.stop = Some(stop);
-            break;
-        }
-        if run.errors.len() <= ITERATIONS {
-            let there: Vec<f64> = joints.iter().zip(&motion).map(|(joint, motion)| joint + motion).collect();
-            world.move_to(&there);
-        }
-    }
-    run.error_3d = world.error_3d();
-    Ok(run)
+    let Course { errors, condition, stop } = controlled::serve(world, settings, ITERATIONS, &mut |_, _| ())?;
+    Ok(Run { errors, error_3d: world.error_3d(), condition, stop })
 }
 
 /// Runs with a pair of cameras at as many places around the target, evenly.

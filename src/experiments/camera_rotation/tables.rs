@@ -34,7 +34,7 @@ pub(in crate::experiments) const TABLE5_3: Experiment = Experiment {
 };
 
 /// Iterations that the thesis counts as one step, as its figures show: 50 of them at λ = 0.25 would leave nothing of what it prints.
-const STRIDE: usize = 4;
+pub(super) const STRIDE: usize = 4;
 
 fn run(options: &Options, tracker: Tracker, printed: &[Printed]) -> Result<Outcome, Error> {
     let mut rows = Vec::new();

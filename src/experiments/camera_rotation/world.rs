@@ -1,5 +1,6 @@
 //! The scene: an arm, two cameras at a target, and trackers.
 use crate::Error;
+use crate::experiments::without_rig::controlled::Controlled;
 use crate::rig::{Camera, Feature, Parent, Rig, catalog};
 use crate::servo::uncalibrated::{Quantity, Row};
 use crate::servo::{Arm, Configuration};
@@ -169,7 +170,8 @@ impl View {
         [-0.15, 0.15].map(|beside| View { angle, beside, distance: 1.0 })
     }
 
-    fn pose(&self, target: &Vector3<f64>) -> Pose {
+    /// `world_from_camera`, of a target in the world [m].
+    pub fn pose(&self, target: &Vector3<f64>) -> Pose {
         let ahead = Vector3::new(self.angle.cos(), self.angle.sin(), 0.0);
         let down = -Vector3::z();
         let right = down.cross(&ahead);
@@ -239,5 +241,28 @@ impl World {
     /// Sum of the absolute coordinates of what separates the points from their targets [m].
     pub fn error_3d(&self) -> f64 {
         points(&self.at).iter().zip(&self.target_points).map(|(point, target)| (point - target).abs().sum()).sum()
+    }
+}
+
+impl Controlled for World {
+    fn quantities(&self) -> Vec<Quantity> {
+        World::quantities(self)
+    }
+
+    fn rows(&mut self) -> Result<Vec<Row>, Error> {
+        Ok(World::rows(self))
+    }
+
+    fn readings(&self) -> Vec<f64> {
+        self.joints().to_vec()
+    }
+
+    fn errors(&mut self) -> Vec<f64> {
+        World::errors(self)
+    }
+
+    fn carry_out(&mut self, motion: &[f64]) {
+        let there: Vec<f64> = self.joints().iter().zip(motion).map(|(joint, motion)| joint + motion).collect();
+        self.move_to(&there);
     }
 }
