@@ -78,14 +78,17 @@ fn run(options: &Options) -> Result<Outcome, Error> {
         let label = format!("{}, 3D error at 0.55 m over that at 0.4 m", TRACKERS[series].0);
         rows.push(Row::new(label, published, &ratio));
     }
-    let stopped = |index: &usize| stops[*index].iter().flatten().sum::<f64>();
-    let words = |index: usize| {
+    let words = |index: usize, reason: f64| {
+        let times = stops[index].iter().flatten().filter(|stop| **stop == reason).count();
         let (view, rest) = (index / (TRACKERS.len() * DISTANCES.len()), index % (TRACKERS.len() * DISTANCES.len()));
         let (tracker, distance) = (TRACKERS[rest / DISTANCES.len()].0, DISTANCES[rest % DISTANCES.len()]);
-        format!("{} of {} with {tracker} at {distance} m ({})", stopped(&index), options.trials, VIEWS[view])
+        let words = format!("{times} of {} with {tracker} at {distance} m ({})", options.trials, VIEWS[view]);
+        (times > 0).then_some(words)
     };
-    let bad: Vec<String> = (0..stops.len()).filter(|index| stopped(index) > 0.0).map(words).collect();
-    let bad = if bad.is_empty() { "none".to_owned() } else { bad.join(", ") };
+    let all = |reason: f64| {
+        let bad: Vec<String> = (0..stops.len()).filter_map(|index| words(index, reason)).collect();
+        if bad.is_empty() { "none".to_owned() } else { bad.join(", ") }
+    };
     Ok(Outcome {
         setting: format!(
             "WAM of 4 joints, 3 points; exploratory motions of 3 degrees, gain {GAIN}, {COMMANDS} commands, the Jacobian kept; \
@@ -95,7 +98,8 @@ fn run(options: &Options) -> Result<Outcome, Error> {
         abscissa: Some("distance of the cameras from the target [m]"),
         rows,
         notes: vec![
-            format!("stopped because errors grew: {bad}"),
+            format!("stopped because errors grew: {}", all(DIVERGED)),
+            format!("refused before the arm moved, where both cameras see the same within the noise: {}", all(UNDETERMINED)),
             "published in words: the image error is much the same for both pairs of cameras, the 3D error grows with the distance, whole pixels \
              make it inconsistent, one camera converges more slowly and diverges at 0.6 m with 0.3 px; the thesis expects real trackers to err \
              more the farther they are"
@@ -107,6 +111,10 @@ fn run(options: &Options) -> Result<Outcome, Error> {
     })
 }
 
+/// Why runs were stopped before their end.
+const DIVERGED: f64 = 1.0;
+const UNDETERMINED: f64 = 2.0;
+
 /// What is drawn where, and whether it is of images.
 const PANELS: [(&str, bool); 6] = [
     ("3D error, parallel cameras [mm]", false),
@@ -117,7 +125,7 @@ const PANELS: [(&str, bool); 6] = [
     ("image error, one camera [px]", true),
 ];
 
-/// 3D errors [mm], then image errors [px], then whether the run was stopped: by views, trackers, distances.
+/// 3D errors [mm], then image errors [px], then why the run was stopped or 0: by views, trackers, distances.
 fn trial(seed: u64) -> Result<Vec<Option<f64>>, Error> {
     let arm = catalog::rig("wam4")?;
     let tip = Model::new(&arm)?.tip(&TARGET);
@@ -152,6 +160,10 @@ fn trial(seed: u64) -> Result<Vec<Option<f64>>, Error> {
     let last = |run: &Run| run.moments.last().cloned();
     let in_space = runs.iter().map(|run| last(run).map(|moment| 1e3 * moment.error_m));
     let in_images = runs.iter().map(|run| last(run).and_then(|moment| moment.error_px));
-    let stopped = runs.iter().map(|run| Some(f64::from(u8::from(!matches!(run.stop, Stop::TimedOut { .. })))));
+    let stopped = runs.iter().map(|run| match run.stop {
+        Stop::TimedOut { .. } => Some(0.0),
+        Stop::Undetermined { .. } => Some(UNDETERMINED),
+        _ => Some(DIVERGED),
+    });
     Ok(in_space.chain(in_images).chain(stopped).collect())
 }
