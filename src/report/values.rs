@@ -1,8 +1,7 @@
 //! What was learned, number by number, beside what was known.
 use super::calibration::Subject;
 use super::page::Page;
-use crate::rig::{CameraField, Parameter, Rig};
-use handeye_solvers::Pose;
+use crate::rig::{Parameter, Rig, Value};
 use handeye_solvers::manifold::so3;
 
 /// One row per parameter: before, learned, standard deviation.
@@ -33,27 +32,11 @@ pub(super) fn table(page: &mut Page, subject: &Subject<'_>) {
 
 /// The numbers of a parameter; `None` where it has no value.
 fn numbers(rig: &Rig, parameter: &Parameter) -> Option<Vec<f64>> {
-    let pose = |pose: Pose| {
-        let w = so3::log(&pose.rotation);
-        pose.translation.iter().chain(&w).copied().collect::<Vec<f64>>()
-    };
-    match *parameter {
-        Parameter::Base => rig.robot.base.map(pose),
-        Parameter::JointField { joint, field } => field.value(&rig.robot.joints[joint]).map(|value| vec![value]),
-        Parameter::CameraPose(camera) => rig.cameras[camera].pose.map(pose),
-        Parameter::CameraField { camera, field } => {
-            let camera = &rig.cameras[camera];
-            match field {
-                CameraField::Fx => camera.fx.map(|value| vec![value]),
-                CameraField::Fy => camera.fy.map(|value| vec![value]),
-                CameraField::Cx => camera.cx.map(|value| vec![value]),
-                CameraField::Cy => camera.cy.map(|value| vec![value]),
-                CameraField::Distortion => camera.distortion.clone(),
-            }
-        }
-        Parameter::FeatureXyz(feature) => rig.features[feature].xyz.map(|xyz| xyz.to_vec()),
-        Parameter::TargetPose(target) => rig.targets[target].pose.map(pose),
-    }
+    Some(match rig.value(parameter)? {
+        Value::Number(number) => vec![number],
+        Value::Numbers(numbers) => numbers,
+        Value::Pose(pose) => pose.translation.iter().chain(&so3::log(&pose.rotation)).copied().collect(),
+    })
 }
 
 fn joined(values: &[f64], digits: impl Fn(f64) -> String) -> String {

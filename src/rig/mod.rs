@@ -6,6 +6,7 @@ mod paths;
 pub(crate) mod read;
 mod replace;
 mod types;
+mod values;
 mod write;
 
 pub use model::{Model, ModelCamera, ModelFeature};
@@ -15,3 +16,4 @@ pub(crate) use read::problem_of_distortion;
 pub use read::read_text;
 pub use replace::replace_file;
 pub use types::*;
+pub use values::Value;
