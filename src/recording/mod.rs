@@ -1,5 +1,6 @@
 //! Recordings: what was commanded, read and seen; one file per format.
 mod bag;
+mod checked;
 mod command;
 mod images;
 mod join;
