@@ -3,6 +3,7 @@
 pub mod calibrate;
 pub mod camera;
 pub mod chain;
+pub mod cli;
 pub mod detect;
 pub mod doctor;
 mod error;
@@ -22,6 +23,9 @@ pub mod servo;
 pub mod simulate;
 mod svg;
 pub mod urdf;
+
+// The command line names the library as everybody else does.
+extern crate self as handeye;
 
 pub use error::Error;
 pub use handeye_solvers as solvers;

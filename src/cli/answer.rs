@@ -2,7 +2,6 @@
 use handeye::Error;
 use serde_json::{Value, json};
 use std::io::{self, Write};
-use std::process::ExitCode;
 
 /// The answer of a command, for people and for programs.
 pub struct Answer {
@@ -21,7 +20,7 @@ impl Answer {
 }
 
 /// Prints what came of a command, and gives the exit status.
-pub fn print(result: Result<Answer, Error>, is_json: bool) -> ExitCode {
+pub fn print(result: Result<Answer, Error>, is_json: bool) -> u8 {
     let (text, mut json, failure) = match result {
         Ok(Answer { text, json, failure }) => (text, json, failure.map(|reason| (reason, 1))),
         Err(error) => (String::new(), json!({}), Some((error.to_string(), if error.is_input() { 2 } else { 1 }))),
@@ -32,7 +31,7 @@ pub fn print(result: Result<Answer, Error>, is_json: bool) -> ExitCode {
     let status = write(&if is_json { format!("{json}\n") } else { text });
     if let Some((reason, status)) = failure {
         complain(&reason);
-        return ExitCode::from(status);
+        return status;
     }
     status
 }
@@ -44,7 +43,7 @@ pub struct Refusal {
 }
 
 impl Refusal {
-    pub fn print(self) -> ExitCode {
+    pub fn print(self) -> u8 {
         let is_help = !self.error.use_stderr();
         if self.is_json && !is_help {
             let message = self.error.to_string();
@@ -53,19 +52,19 @@ impl Refusal {
         }
         // Nobody is left to be told where not even this can be written.
         let _ = self.error.print();
-        ExitCode::from(if is_help { 0 } else { 2 })
+        if is_help { 0 } else { 2 }
     }
 }
 
 /// Writes to standard output. A reader who has seen enough and closed the pipe is no failure.
-fn write(text: &str) -> ExitCode {
+fn write(text: &str) -> u8 {
     let mut output = io::stdout().lock();
     match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             complain(&format!("standard output: {error}"));
-            ExitCode::FAILURE
+            1
         }
-        _ => ExitCode::SUCCESS,
+        _ => 0,
     }
 }
 

@@ -1,4 +1,6 @@
-//! The command line: one file per subcommand, which answers; printing and exiting happen in `answer.rs`.
+//! The command line: one file per subcommand, which answers; printing happens in `answer.rs`.
+//!
+//! Only [`run`] is public: programs of any language that bring the command along call it.
 mod answer;
 mod calibrate;
 mod check;
@@ -25,9 +27,7 @@ mod task;
 mod trust;
 mod words;
 
-pub use answer::{Refusal, print};
-
-use answer::Answer;
+use answer::{Answer, Refusal, print};
 use clap::Parser;
 use handeye::Error;
 use std::ffi::OsString;
@@ -50,10 +50,10 @@ Exit status: 0 done; 1 the work could not be done, with the reason; 2 unusable i
 /// TOML files, recordings JSON Lines, ROS 2 bags (MCAP), CSV or LeRobot datasets; metres, radians, seconds, pixels.
 #[derive(Parser)]
 #[command(name = "handeye", version, after_help = EXAMPLES, arg_required_else_help = true, max_term_width = 120)]
-pub struct Cli {
+struct Cli {
     /// Print one JSON object on standard output, and nothing else there
     #[arg(long, global = true)]
-    pub json: bool,
+    json: bool,
     #[command(subcommand)]
     command: Command,
 }
@@ -77,8 +77,16 @@ enum Command {
     Completions(completions::Completions),
 }
 
-/// Reads the arguments, of which the first is the program's name.
-pub fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Cli, Refusal> {
+/// Runs the command `handeye` with these arguments, of which the first is the program's name, prints what comes of it, and returns the exit
+/// status: 0 done; 1 the work could not be done; 2 unusable input or arguments.
+pub fn run(arguments: impl Iterator<Item = OsString>) -> u8 {
+    match parse(arguments) {
+        Ok(arguments) => print(arguments.run(), arguments.json),
+        Err(refusal) => refusal.print(),
+    }
+}
+
+fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Cli, Refusal> {
     let arguments: Vec<OsString> = arguments.collect();
     let is_json = arguments.iter().any(|argument| argument == "--json");
     Cli::try_parse_from(arguments).map_err(|error| Refusal { error, is_json })
@@ -86,7 +94,7 @@ pub fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Cli, Refusal> 
 
 impl Cli {
     /// Does what was asked for.
-    pub fn run(&self) -> Result<Answer, Error> {
+    fn run(&self) -> Result<Answer, Error> {
         match &self.command {
             Command::Demo(demo) => demo.run(self.json),
             Command::Check(check) => check.run(),
