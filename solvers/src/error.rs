@@ -17,4 +17,12 @@ pub enum Error {
     /// The data leave a free node open, so it has no covariance.
     #[error("the data do not determine every free node: the normal equations are singular")]
     Singular,
+    /// A factor is on too many nodes, or on none.
+    #[error("a factor is on 1 to {most} nodes, found {found}")]
+    Arguments {
+        /// How many.
+        found: usize,
+        /// How many at most.
+        most: usize,
+    },
 }

@@ -21,7 +21,7 @@ pub struct Graph {
     pub(crate) order: Vec<FactorKey>,
     /// Every derived node's function as (pool, place in the pool), in the order of adding.
     pub(crate) derived: Vec<DerivedNode>,
-    factor_pools: BTreeMap<TypeId, usize>,
+    pub(crate) factor_pools: BTreeMap<TypeId, usize>,
     function_pools: BTreeMap<TypeId, usize>,
     /// Changes whenever the structure does, so that a workspace knows that it is out of date.
     pub(crate) revision: u64,

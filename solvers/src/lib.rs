@@ -8,6 +8,7 @@ pub mod check;
 mod chunks;
 mod covariance;
 mod derivative;
+mod dynamic;
 mod eigen;
 mod elastic;
 mod error;
@@ -37,6 +38,7 @@ mod weak_directions;
 mod workspace;
 
 pub use covariance::Covariance;
+pub use dynamic::{AnyKey, DynamicFactor, DynamicSettings};
 pub use error::Error;
 pub use factor::{Factor, Function};
 pub use gauss_newton::GaussNewton;
