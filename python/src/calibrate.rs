@@ -1,0 +1,349 @@
+//! `calibrate` and what it gives.
+use crate::errors::raise;
+use crate::evaluate::by_camera;
+use crate::recording::Recording;
+use crate::rig::Rig;
+use crate::work;
+use handeye::calibrate::{self as library, DeterminedBy, NoiseTrial, Options, Report};
+use handeye::report::{Subject, html};
+use handeye::rig;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Learns what is unknown of a rig from a recording, and refines the rest.
+///
+/// rig: what is known; left out, everything is learned from the recording alone. relearn: paths of parameters to learn anew from few
+/// samples while everything else is held, such as ``["cameras.left"]``. estimate_noise: the noise of pixels, points, joints, poses and
+/// actions is estimated from the data. select_noise: the noise of joints or poses is picked by how well samples held out are predicted.
+/// influence: what leaving out each sample would change is computed too. seed: the same seed gives the same rig, byte for byte.
+/// progress: called with a ``Progress`` as the work goes on; what it raises ends the work, and so does Ctrl-C. threads: to work on, all
+/// cores where left out; the result does not depend on it.
+///
+/// Where ``converged`` of the result is false, what was learned is not to be relied on.
+///
+/// Raises ``NotDone`` where the recording cannot determine the rig, naming what is missing, and ``UnusableInput`` where the two do not
+/// fit together.
+#[pyfunction]
+#[pyo3(signature = (recording, rig = None, *, relearn = None, estimate_noise = false, select_noise = false, influence = false, seed = 1,
+    progress = None, threads = None))]
+#[expect(clippy::too_many_arguments, reason = "one keyword per option")]
+pub fn calibrate(
+    py: Python<'_>,
+    recording: &Recording,
+    rig: Option<&Rig>,
+    relearn: Option<Vec<String>>,
+    estimate_noise: bool,
+    select_noise: bool,
+    influence: bool,
+    seed: u64,
+    progress: Option<Py<PyAny>>,
+    threads: Option<usize>,
+) -> PyResult<Calibration> {
+    let (before, text) = rig.map_or_else(Default::default, |rig| (rig.inner.clone(), rig.text.clone()));
+    let options = Options { seed, estimate_noise, influence };
+    let recording = recording.inner.clone();
+    let inner = work::run(py, progress.as_ref(), threads, |observer| {
+        let mut start = before.clone();
+        if select_noise {
+            let trials = library::select_noise(&start, &recording, &options, observer)?;
+            start.noise = NoiseTrial::best(&trials).map_or(start.noise, |best| best.noise);
+        }
+        match &relearn {
+            Some(paths) => library::relearn(&start, &recording, paths, &options, observer),
+            None => library::calibrate(&start, &recording, &options, observer),
+        }
+    })?;
+    Ok(Calibration { inner, before, text, recording })
+}
+
+/// A learned rig and how it was learned.
+#[pyclass(module = "handeye", frozen)]
+pub struct Calibration {
+    inner: library::Calibration,
+    before: rig::Rig,
+    text: Option<String>,
+    recording: Arc<handeye::recording::Recording>,
+}
+
+impl Calibration {
+    fn report(&self) -> &Report {
+        &self.inner.report
+    }
+}
+
+#[pymethods]
+impl Calibration {
+    /// The rig with every value filled in.
+    #[getter]
+    fn rig(&self) -> Rig {
+        Rig { inner: self.inner.rig.clone(), text: self.text.clone() }
+    }
+
+    /// True where a minimum was reached.
+    #[getter]
+    fn converged(&self) -> bool {
+        self.report().converged
+    }
+
+    /// Samples used.
+    #[getter]
+    fn samples(&self) -> usize {
+        self.report().samples
+    }
+
+    /// Detections used.
+    #[getter]
+    fn observations(&self) -> usize {
+        self.report().observations
+    }
+
+    /// Detections left out as wrong.
+    #[getter]
+    fn rejected(&self) -> usize {
+        self.report().rejected
+    }
+
+    /// Root mean square of the pixel distances [px].
+    #[getter]
+    fn rms_px(&self) -> f64 {
+        self.report().rms_px
+    }
+
+    /// Mean pixel distance [px].
+    #[getter]
+    fn mean_px(&self) -> f64 {
+        self.report().mean_px
+    }
+
+    /// Median pixel distance [px].
+    #[getter]
+    fn median_px(&self) -> f64 {
+        self.report().median_px
+    }
+
+    /// ``Errors`` by camera.
+    #[getter]
+    fn cameras<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        by_camera(py, &self.report().cameras)
+    }
+
+    /// What was minimised, in order.
+    #[getter]
+    fn stages(&self) -> Vec<Stage> {
+        let stage = |stage: &library::StageReport| {
+            let library::StageReport { name, iterations, loss_before, loss_after, seconds } = stage.clone();
+            Stage { name, iterations, loss_before, loss_after, seconds }
+        };
+        self.report().stages.iter().map(stage).collect()
+    }
+
+    /// What the data cannot determine, in words, and how it was fixed.
+    #[getter]
+    fn gauge(&self) -> Vec<String> {
+        self.report().gauge.clone()
+    }
+
+    /// Where the robot's state is known from, in words: which readings and actions take part, and how well they are known.
+    #[getter]
+    fn states(&self) -> Vec<String> {
+        self.report().states.clone()
+    }
+
+    /// Samples, images and cameras that do not fit, in words.
+    #[getter]
+    fn findings(&self) -> Vec<String> {
+        self.report().findings.iter().map(ToString::to_string).collect()
+    }
+
+    /// Standard deviation of the tip's position over the recorded samples; ``None`` where the data leave the rig open.
+    #[getter]
+    fn tip(&self) -> Option<TipDeviation> {
+        let tip = self.report().tip?;
+        Some(TipDeviation { median: tip.median, largest: tip.largest, by_data: tip.by_data, metric: tip.metric })
+    }
+
+    /// Standard deviations of what was learned, by parameter path: see ``Rig.deviations``.
+    #[getter]
+    fn deviations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.rig().into_pyobject(py)?.getattr("deviations")
+    }
+
+    /// Combinations of numbers that nothing, or a prior more than the data, determines; the weakest first.
+    #[getter]
+    fn weak(&self) -> Vec<Weak> {
+        let weak = |weak: &library::Combination| Weak {
+            numbers: weak.numbers.clone(),
+            determined_by: match weak.determined_by {
+                DeterminedBy::Nothing => "nothing",
+                DeterminedBy::Prior(_) => "prior",
+                DeterminedBy::Poorly { .. } => "data, poorly",
+            },
+            tip: weak.tip,
+            cure: weak.cure.clone(),
+            text: weak.to_string(),
+        };
+        self.report().weak.iter().map(weak).collect()
+    }
+
+    /// What leaving out each sample would change, where ``influence`` was asked for.
+    #[getter]
+    fn influence(&self) -> Vec<Influence> {
+        let one = |one: &library::Influence| {
+            let library::Influence { sample, tip, rms_px, rms_points_m, misfit } = *one;
+            Influence { sample, tip, rms_px, rms_points_m, misfit }
+        };
+        self.report().influence.iter().map(one).collect()
+    }
+
+    /// What was learned from targets, where these and not pixels were used; the pixel distances are 0 then.
+    #[getter]
+    fn targets(&self) -> Option<TargetReport> {
+        let targets = self.report().targets.as_ref()?;
+        Some(TargetReport {
+            rms_xyz: targets.rms_xyz,
+            rms_rot: targets.rms_rot,
+            time_offset: targets.time_offset,
+            scale: targets.scale,
+            disagreements: targets.disagreements.iter().map(|one| (one.name.clone(), one.rot, one.xyz)).collect(),
+        })
+    }
+
+    /// The report as one self-contained HTML page, which is written to a file. ``title`` stands at its top.
+    #[pyo3(name = "report", signature = (path, title = None))]
+    fn report_to(&self, py: Python<'_>, path: PathBuf, title: Option<&str>) -> PyResult<()> {
+        let page = self.html(py, title)?;
+        rig::replace_file(&path, |file| file.write_all(page.as_bytes())).map_err(raise)
+    }
+
+    /// The same page as text.
+    #[pyo3(signature = (title = None))]
+    fn html(&self, py: Python<'_>, title: Option<&str>) -> PyResult<String> {
+        let subject = Subject {
+            title: title.unwrap_or("A learned rig"),
+            before: &self.before,
+            calibration: &self.inner,
+            recording: &self.recording,
+            tables: &[],
+        };
+        py.detach(|| html(&subject)).map_err(raise)
+    }
+
+    fn __repr__(&self) -> String {
+        let report = self.report();
+        let converged = if report.converged { "" } else { ", NOT CONVERGED" };
+        let fit = match &report.targets {
+            Some(targets) => format!("{:.3} mm and {:.4}° rms", 1e3 * targets.rms_xyz, targets.rms_rot.to_degrees()),
+            None => format!("{:.3} px rms", report.rms_px),
+        };
+        format!(
+            "<handeye.Calibration {} samples, {} detections, {fit}{converged}>",
+            report.samples, report.observations
+        )
+    }
+
+    /// What a person wants to know first.
+    fn __str__(&self) -> String {
+        let report = self.report();
+        let mut lines = vec![self.__repr__().trim_matches(['<', '>']).trim_start_matches("handeye.").to_owned()];
+        if let Some(tip) = &report.tip {
+            let length =
+                |length: f64| if tip.metric { format!("{:.3} mm", 1e3 * length) } else { format!("{length:.2e}") };
+            lines.push(format!(
+                "the tip's position is known to {} (median; largest {})",
+                length(tip.median),
+                length(tip.largest)
+            ));
+        }
+        for (title, list) in [
+            ("left open by the data", &report.gauge),
+            ("the robot's state", &report.states),
+            ("does not fit", &self.findings()),
+        ] {
+            lines.extend(list.iter().map(|line| format!("{title}: {line}")));
+        }
+        lines.join("\n")
+    }
+}
+
+/// One stage of a calibration.
+#[pyclass(module = "handeye", frozen, get_all)]
+pub struct Stage {
+    /// Its name.
+    name: String,
+    /// Iterations of the minimiser, over all starts.
+    iterations: usize,
+    /// Loss before.
+    loss_before: f64,
+    /// Loss after.
+    loss_after: f64,
+    /// How long it took [s].
+    seconds: f64,
+}
+
+#[pymethods]
+impl Stage {
+    fn __repr__(&self) -> String {
+        let Stage { name, iterations, loss_before, loss_after, .. } = self;
+        format!("<handeye.Stage {name}: {iterations} iterations, loss {loss_before:.4e} -> {loss_after:.4e}>")
+    }
+}
+
+/// Standard deviation of the tip's position over the recorded samples [m, or the model's unit where nothing metric is known].
+#[pyclass(module = "handeye", frozen, get_all)]
+pub struct TipDeviation {
+    /// Median over the samples.
+    median: f64,
+    /// Largest over the samples.
+    largest: f64,
+    /// Median of what the data alone answer for, without what a prior determines more than they do.
+    by_data: f64,
+    /// True where it is in metres.
+    metric: bool,
+}
+
+/// Numbers of a rig that can move together without the data objecting much.
+#[pyclass(module = "handeye", frozen, get_all)]
+pub struct Weak {
+    /// Parameter paths and how far each moves, in its own unit; the largest first and 1.
+    numbers: Vec<(String, f64)>,
+    /// ``"nothing"``, ``"prior"`` (more than the data) or ``"data, poorly"``.
+    determined_by: &'static str,
+    /// Standard deviation of the tip's position that comes of it [m, or the model's unit]; ``None`` where nothing bounds it.
+    tip: Option<f64>,
+    /// What would determine it at the least expense; empty where nothing that can be seen would.
+    cure: String,
+    /// All of it in words.
+    text: String,
+}
+
+/// What leaving out a sample would change, and how well it fits.
+#[pyclass(module = "handeye", frozen, get_all)]
+pub struct Influence {
+    /// Index of the sample, from 0.
+    sample: usize,
+    /// How far the tip would move, root mean square over the samples [m, or the model's unit].
+    tip: Option<f64>,
+    /// Root mean square pixel distance of its detections [px].
+    rms_px: f64,
+    /// Root mean square distance of its points [m].
+    rms_points_m: f64,
+    /// Root mean square of all its errors, by coordinate [standard deviations].
+    misfit: f64,
+}
+
+/// What was learned from targets.
+#[pyclass(module = "handeye", frozen, get_all)]
+pub struct TargetReport {
+    /// Root mean square of the translations' misfits, per axis [m].
+    rms_xyz: f64,
+    /// The same of the rotations [rad].
+    rms_rot: f64,
+    /// How far the clock of the images is ahead of the robot's, and its standard deviation [s], where they were recorded apart.
+    time_offset: Option<(f64, f64)>,
+    /// Factor of the reported translations and its standard deviation, where it is not 1.
+    scale: Option<(f64, f64)>,
+    /// Closed forms that are far from what was learned: name, angle [rad], distance [m].
+    disagreements: Vec<(String, f64, f64)>,
+}

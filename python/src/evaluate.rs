@@ -1,0 +1,202 @@
+//! `evaluate` and `residuals`: how well a rig predicts a recording.
+use crate::arrays::{NewArray, array};
+use crate::errors::raise;
+use crate::recording::Recording;
+use crate::rig::Rig;
+use handeye::calibrate::{self as library, CameraErrors};
+use handeye::report;
+use handeye::rig::replace_file;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Distances between what a rig predicts and what was seen; those in px are of pixels, those in m of points of depth cameras, 0 where
+/// there are none.
+#[pyclass(module = "handeye", frozen, get_all)]
+#[derive(Clone)]
+pub struct Errors {
+    /// How many detections were compared, pixels and points.
+    observations: usize,
+    /// How many were left out as wrong.
+    rejected: usize,
+    /// Root mean square [px].
+    rms_px: f64,
+    /// Mean [px].
+    mean_px: f64,
+    /// Median [px].
+    median_px: f64,
+    /// Largest [px].
+    max_px: f64,
+    /// How many are predicted behind the camera.
+    behind: usize,
+    /// How many of the detections are points.
+    points: usize,
+    /// Root mean square of the points [m].
+    rms_m: f64,
+    /// Mean of the points [m].
+    mean_m: f64,
+    /// Median of the points [m].
+    median_m: f64,
+    /// Largest of the points [m].
+    max_m: f64,
+}
+
+#[pymethods]
+impl Errors {
+    fn __repr__(&self) -> String {
+        let points = if self.points > 0 { format!(", points {:.3} mm", 1e3 * self.rms_m) } else { String::new() };
+        format!("<handeye.Errors {} detections, {:.3} px rms{points}>", self.observations, self.rms_px)
+    }
+}
+
+impl Errors {
+    pub fn new(errors: &library::Errors, rejected: usize) -> Self {
+        let points = &errors.points;
+        Errors {
+            observations: errors.observations,
+            rejected,
+            rms_px: errors.rms_px,
+            mean_px: errors.mean_px,
+            median_px: errors.median_px,
+            max_px: errors.max_px,
+            behind: errors.behind,
+            points: points.observations,
+            rms_m: points.rms_m,
+            mean_m: points.mean_m,
+            median_m: points.median_m,
+            max_m: points.max_m,
+        }
+    }
+}
+
+/// Errors by camera, in the rig's order.
+pub fn by_camera<'py>(py: Python<'py>, cameras: &[CameraErrors]) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    for camera in cameras {
+        dict.set_item(&camera.name, Errors::new(&camera.errors, camera.rejected).into_pyobject(py)?)?;
+    }
+    Ok(dict)
+}
+
+/// How well a rig predicts a recording.
+#[pyclass(module = "handeye", frozen)]
+pub struct Evaluation {
+    inner: library::Evaluation,
+    rig: handeye::rig::Rig,
+    recording: Arc<handeye::recording::Recording>,
+}
+
+#[pymethods]
+impl Evaluation {
+    /// Samples with joints or a tip pose, and at least one comparable detection.
+    #[getter]
+    fn samples(&self) -> usize {
+        self.inner.samples
+    }
+
+    /// How many detections were compared.
+    #[getter]
+    fn observations(&self) -> usize {
+        self.inner.total.observations
+    }
+
+    /// Detections whose camera, feature or sample's state the rig does not know.
+    #[getter]
+    fn rejected(&self) -> usize {
+        self.inner.rejected
+    }
+
+    /// Root mean square of the pixel distances [px].
+    #[getter]
+    fn rms_px(&self) -> f64 {
+        self.inner.total.rms_px
+    }
+
+    /// Mean pixel distance [px].
+    #[getter]
+    fn mean_px(&self) -> f64 {
+        self.inner.total.mean_px
+    }
+
+    /// Median pixel distance [px].
+    #[getter]
+    fn median_px(&self) -> f64 {
+        self.inner.total.median_px
+    }
+
+    /// Over all cameras.
+    #[getter]
+    fn total(&self) -> Errors {
+        Errors::new(&self.inner.total, self.inner.rejected)
+    }
+
+    /// By camera.
+    #[getter]
+    fn cameras<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        by_camera(py, &self.inner.cameras)
+    }
+
+    /// Median pixel distance of every sample [px], shape (samples,); NaN where nothing was compared.
+    #[getter]
+    fn sample_median_px<'py>(&self, py: Python<'py>) -> NewArray<'py> {
+        let medians: Vec<f64> = self.inner.sample_median_px.iter().map(|median| median.unwrap_or(f64::NAN)).collect();
+        array(py, &[medians.len()], medians)
+    }
+
+    /// One self-contained HTML page about it, which is written to a file. ``title`` stands at its top.
+    #[pyo3(signature = (path, title = None))]
+    fn report(&self, py: Python<'_>, path: PathBuf, title: Option<&str>) -> PyResult<()> {
+        let page = self.html(py, title)?;
+        replace_file(&path, |file| file.write_all(page.as_bytes())).map_err(raise)
+    }
+
+    /// The same page as text.
+    #[pyo3(signature = (title = None))]
+    fn html(&self, py: Python<'_>, title: Option<&str>) -> PyResult<String> {
+        let title = title.unwrap_or("A rig on a recording");
+        py.detach(|| report::evaluation_html(title, &self.rig, &self.recording, &self.inner)).map_err(raise)
+    }
+
+    fn __repr__(&self) -> String {
+        let (samples, rms) = (self.inner.samples, self.inner.total.rms_px);
+        format!("<handeye.Evaluation {samples} samples, {} detections, {rms:.3} px rms>", self.inner.total.observations)
+    }
+}
+
+/// Predicts every detection of a recording from its joints, or from its tip's pose where it has none, and compares.
+///
+/// Raises ``UnusableInput`` where the rig is not complete or has another number of joints, ``NotDone`` where there is nothing to compare.
+#[pyfunction]
+pub fn evaluate(py: Python<'_>, rig: &Rig, recording: &Recording) -> PyResult<Evaluation> {
+    let (rig, recording) = (&rig.inner, &recording.inner);
+    let inner = py.detach(|| library::evaluate(rig, recording)).map_err(raise)?;
+    Ok(Evaluation { inner, rig: rig.clone(), recording: recording.clone() })
+}
+
+/// Predicted minus seen of every pixel [px]: camera -> (samples, features, 2), NaN where nothing was seen or the rig knows no camera or
+/// feature of the name. Features are in the order of ``recording.feature_names``; noisy readings are refined by what was seen first.
+///
+/// Raises ``UnusableInput`` where the rig is not complete or has another number of joints.
+#[pyfunction]
+pub fn residuals<'py>(py: Python<'py>, rig: &Rig, recording: &Recording) -> PyResult<Bound<'py, PyDict>> {
+    let (rig, recording) = (&rig.inner, &recording.inner);
+    let found = py.detach(|| report::residuals(rig, recording)).map_err(raise)?;
+    let (samples, features) = (recording.samples.len(), recording.features.len());
+    let places: BTreeMap<&str, usize> =
+        recording.features.iter().enumerate().map(|(i, name)| (name.as_str(), i)).collect();
+    let places: Vec<Option<usize>> =
+        rig.features.iter().map(|feature| places.get(feature.name.as_str()).copied()).collect();
+    let mut of_camera: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    for residual in found {
+        let Some(place) = places[residual.feature] else { continue };
+        let numbers = of_camera.entry(residual.camera).or_insert_with(|| vec![f64::NAN; samples * features * 2]);
+        numbers[2 * (residual.sample * features + place)..][..2].copy_from_slice(&residual.error);
+    }
+    let dict = PyDict::new(py);
+    for (camera, numbers) in of_camera {
+        dict.set_item(&rig.cameras[camera].name, array(py, &[samples, features, 2], numbers))?;
+    }
+    Ok(dict)
+}

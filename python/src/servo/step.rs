@@ -1,0 +1,234 @@
+//! One step towards goals, under limits.
+use super::limits::Limit;
+use super::tasks::Task;
+use crate::arrays::{Floats, NewArray, array, list, vector};
+use crate::errors::{raise, unusable};
+use crate::rig::Rig;
+use crate::sight::Layout;
+use handeye::rig;
+use handeye::servo::{self, Arm, Configuration, Constraint};
+use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use std::sync::Arc;
+
+/// A task and how strictly it comes before others.
+#[pyclass(module = "handeye.servo", frozen)]
+pub struct Goal {
+    task: Py<Task>,
+    priority: usize,
+    share: f64,
+}
+
+#[pymethods]
+impl Goal {
+    /// priority: 0 comes first; a goal moves only in what those of smaller numbers leave open, and of one number goals share by their
+    /// standard deviations. share: of the error that a step shall take away, in (0, 1]; a loop whose errors shall fall by the rate r [1/s]
+    /// takes 1 - exp(-r dt).
+    #[new]
+    #[pyo3(signature = (task, *, priority = 0, share = 1.0))]
+    fn new(task: Py<Task>, priority: usize, share: f64) -> PyResult<Self> {
+        if share > 0.0 && share <= 1.0 { Ok(Goal { task, priority, share }) } else { Err(unusable("share: in (0, 1]")) }
+    }
+}
+
+/// Finds motions of a complete rig that lead towards goals under limits, one step at a time.
+///
+/// Joint limits of the rig (range, speed, acceleration) are hard; every other limit gives way only where it must, and the step says
+/// which, and how far.
+#[pyclass(module = "handeye.servo")]
+pub struct Stepper {
+    inner: servo::Stepper,
+    rig: Arc<rig::Rig>,
+    arm: Arm,
+    at: Configuration,
+    joints: Vec<f64>,
+    /// The motion of the step before, over its duration [rad/s or m/s].
+    velocity: Vec<f64>,
+}
+
+#[pymethods]
+impl Stepper {
+    /// damping: share of the squared errors by which steps are damped, (1 rad or 1 m)⁻²; 0 takes whole Gauss-Newton steps.
+    #[new]
+    #[pyo3(signature = (rig, *, damping = 1e-3))]
+    fn new(rig: &Rig, damping: f64) -> PyResult<Self> {
+        let arm = Arm::new(&rig.inner).map_err(raise)?;
+        let velocity = vec![0.0; arm.joints()];
+        let (inner, rig) = (servo::Stepper::new(damping), Arc::new(rig.inner.clone()));
+        Ok(Stepper { inner, rig, arm, at: Configuration::default(), joints: Vec::new(), velocity })
+    }
+
+    /// The motion of the next ``dt`` seconds that leads best towards the goals, from joints where the arm is now.
+    ///
+    /// joints: readings, shape (n_joints,) [rad or m]. goals: a ``Goal`` or a ``Task`` each. velocity: how fast the joints move now,
+    /// (n_joints,) [rad/s or m/s]; left out, that of the last step's motion, 0 at first. The motion is finite and inside the joints'
+    /// bounds.
+    #[pyo3(signature = (joints, goals, *, dt, limits = None, velocity = None))]
+    fn step(
+        &mut self,
+        joints: &Bound<'_, PyAny>,
+        goals: Vec<Bound<'_, PyAny>>,
+        dt: f64,
+        limits: Option<Vec<Bound<'_, Limit>>>,
+        velocity: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Step> {
+        let n = self.arm.joints();
+        read("joints", joints, n, &mut self.joints)?;
+        if let Some(velocity) = velocity {
+            read("velocity", velocity, n, &mut self.velocity)?;
+        }
+        self.arm.configure(&self.joints, &mut self.at);
+        self.at.velocity.clone_from(&self.velocity);
+        let mut borrowed: Vec<(PyRef<'_, Task>, usize, f64)> = Vec::with_capacity(goals.len());
+        for goal in &goals {
+            borrowed.push(match goal.cast::<Goal>() {
+                Ok(goal) => {
+                    let goal = goal.get();
+                    (goal.task.bind(joints.py()).try_borrow()?, goal.priority, goal.share)
+                }
+                Err(_) => (goal.cast::<Task>()?.try_borrow()?, 0, 1.0),
+            });
+        }
+        let goals: Vec<servo::Goal<'_>> = borrowed
+            .iter()
+            .map(|(task, priority, share)| servo::Goal { task: &task.inner, priority: *priority, share: *share })
+            .collect();
+        let limits: Vec<&dyn servo::Limit> =
+            limits.iter().flatten().map(|limit| &limit.get().inner as &dyn servo::Limit).collect();
+        let step = self.inner.step(&self.arm, &self.at, &goals, &limits, dt).clone();
+        drop(goals);
+        if let Some(raised) = borrowed.iter().find_map(|(task, ..)| task.raised()) {
+            return Err(raised);
+        }
+        self.velocity.clear();
+        self.velocity.extend(step.motion.iter().map(|motion| if dt > 0.0 { motion / dt } else { 0.0 }));
+        Ok(Step { inner: step, rig: self.rig.clone() })
+    }
+}
+
+/// Numbers of an array where they are, or of whatever numpy makes one from.
+pub fn read(what: &str, array: &Bound<'_, PyAny>, n: usize, numbers: &mut Vec<f64>) -> PyResult<()> {
+    if let Ok(array) = array.cast::<PyArray1<f64>>()
+        && array.len() == n
+        && array.is_contiguous()
+    {
+        *numbers = array.to_vec()?;
+        return Ok(());
+    }
+    *numbers = list(what, &array.extract::<Floats<'_>>()?, n)?;
+    Ok(())
+}
+
+/// A motion, and what it is worth.
+#[pyclass(module = "handeye.servo", frozen)]
+pub struct Step {
+    inner: servo::Step,
+    rig: Arc<rig::Rig>,
+}
+
+#[pymethods]
+impl Step {
+    /// Motion of every joint [rad or m], shape (n_joints,): finite, and inside its bounds.
+    #[getter]
+    fn motion<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        vector(py, &self.inner.motion)
+    }
+
+    /// Of every priority in turn, the root of the sum of the squared errors over their standard deviations: now, and as predicted; shape
+    /// (priorities, 2).
+    #[getter]
+    fn errors<'py>(&self, py: Python<'py>) -> NewArray<'py> {
+        let errors = &self.inner.errors;
+        array(py, &[errors.len(), 2], errors.as_flattened().to_vec())
+    }
+
+    /// What holds the motion back.
+    #[getter]
+    fn active(&self) -> Vec<Active> {
+        self.inner.active.iter().map(|active| Active::new(active, &self.rig)).collect()
+    }
+
+    /// Where a limit gave way: constraints that cannot all hold, though without any one of them the others can, in words.
+    #[getter]
+    fn conflict(&self) -> Vec<String> {
+        self.inner.conflict.iter().map(|constraint| constraint.words(&self.rig, &[])).collect()
+    }
+
+    /// True where numbers were not finite or the step broke down: hold the robot then.
+    #[getter]
+    fn failed(&self) -> bool {
+        self.inner.failed
+    }
+
+    fn __repr__(&self) -> String {
+        let servo::Step { motion, active, failed, .. } = &self.inner;
+        let failed = if *failed { ", FAILED" } else { "" };
+        format!("<handeye.servo.Step {motion:.5?}, {} constraints active{failed}>", active.len())
+    }
+}
+
+/// A constraint that holds a motion back.
+#[pyclass(module = "handeye.servo", frozen, get_all)]
+pub struct Active {
+    /// Which, in words.
+    constraint: String,
+    /// The joint whose bound it is, by name; ``None`` for a limit.
+    joint: Option<String>,
+    /// Index of the limit in the list that was given; ``None`` for a joint's bound.
+    limit: Option<usize>,
+    /// How much the cost would fall per unit that it were wider.
+    multiplier: f64,
+    /// How far it gave way, in its own unit; 0 where it holds.
+    slack: f64,
+}
+
+impl Active {
+    pub fn new(active: &servo::Active, rig: &rig::Rig) -> Self {
+        let (joint, limit) = match active.constraint {
+            Constraint::Joint { joint, .. } => (rig.robot.joints.get(joint).map(|joint| joint.name.clone()), None),
+            Constraint::Limit { limit, .. } => (None, Some(limit)),
+        };
+        let servo::Active { constraint, multiplier, slack } = active;
+        Active { constraint: constraint.words(rig, &[]), joint, limit, multiplier: *multiplier, slack: *slack }
+    }
+}
+
+#[pymethods]
+impl Active {
+    fn __repr__(&self) -> String {
+        let gave_way = if self.slack > 0.0 { format!(", gave way by {:.2e}", self.slack) } else { String::new() };
+        format!("<handeye.servo.Active {}{gave_way}>", self.constraint)
+    }
+}
+
+/// How far a learned rig may be off in what it predicts, from the standard deviations of its numbers: for the margins of limits.
+#[pyclass(module = "handeye.servo", frozen)]
+pub struct PredictionBounds {
+    inner: servo::PredictionBounds,
+    layout: Layout,
+    rig: Arc<rig::Rig>,
+}
+
+#[pymethods]
+impl PredictionBounds {
+    /// rig: one that was learned.
+    #[new]
+    fn new(rig: &Rig) -> PyResult<Self> {
+        let inner = servo::PredictionBounds::new(&rig.inner).map_err(raise)?;
+        Ok(PredictionBounds { inner, layout: Layout::of(&rig.inner), rig: Arc::new(rig.inner.clone()) })
+    }
+
+    /// Bounds of the standard deviations of all predicted pixels of a camera [px], the larger of u and v: shape (n_features,).
+    fn pixels<'py>(&self, py: Python<'py>, joints: Floats<'_>, camera: &str) -> PyResult<NewArray<'py>> {
+        let joints = list("joints", &joints, self.rig.robot.joints.len())?;
+        let camera = self.layout.camera(camera)?;
+        let n = self.rig.features.len();
+        let bounds = (0..n).map(|feature| self.inner.pixel(&joints, camera, feature).unwrap_or(f64::NAN)).collect();
+        Ok(array(py, &[n], bounds))
+    }
+
+    /// Bound of the standard deviation of the tip's position [m], along whichever direction.
+    fn tip(&self, joints: Floats<'_>) -> PyResult<f64> {
+        Ok(self.inner.tip(&list("joints", &joints, self.rig.robot.joints.len())?))
+    }
+}
