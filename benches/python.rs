@@ -116,7 +116,7 @@ impl Steps {
     fn image_based(&mut self) -> f64 {
         let start = ThreadTime::now();
         for (joints, seen) in self.places.iter().zip(&self.seen) {
-            let now = Measurement { time: 0.0, joints, seen };
+            let now = Measurement { time: 0.0, joints, seen, points: &[] };
             assert!(self.controller.decide(&now, &[], 100.0).is_ok());
         }
         start.elapsed().as_secs_f64() / self.places.len() as f64

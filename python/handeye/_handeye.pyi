@@ -752,6 +752,7 @@ class Controller:
         dt: float,
         time: float = 0.0,
         limits: Sequence[Limit] | None = None,
+        points: _Pixels | None = None,
     ) -> Decision: ...
     def held(self) -> None: ...
 
@@ -861,6 +862,7 @@ class ServoLoop:
         dt: float,
         time: float | None = None,
         limits: Sequence[Limit] | None = None,
+        points: _Pixels | None = None,
     ) -> Tick: ...
 
 @final

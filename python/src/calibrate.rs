@@ -226,6 +226,7 @@ impl Calibration {
             calibration: &self.inner,
             recording: &self.recording,
             tables: &[],
+            suggestion: None,
         };
         py.detach(|| html(&subject)).map_err(raise)
     }

@@ -70,7 +70,8 @@ impl Recording {
         degrees: bool,
         episodes: Option<Vec<u64>>,
     ) -> PyResult<Self> {
-        let known = rig.map(|rig| rig.inner.robot.joints.iter().map(|joint| joint.name.clone()).collect());
+        let names = |rig: &Rig| rig.inner.robot.joints.iter().map(|joint| joint.name.clone()).collect::<Vec<String>>();
+        let known = rig.map(names);
         let (joints, known_joints) = (joints.unwrap_or_default(), known.unwrap_or_default());
         let table = TableOptions {
             joints: joints.clone(),

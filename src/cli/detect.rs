@@ -70,8 +70,8 @@ impl Detect {
         let cameras = self.camera.iter().map(|text| read_camera(text)).collect::<Result<Vec<_>, _>>()?;
         let bags = self.images.iter().filter(|image| Format::of(Path::new(image)) == Format::Bag).count();
         let (mut recording, mut notes) = match (bags, &self.images[..]) {
-            (0, _) => self.from_folders(&patterns)?,
-            (_, [bag]) if self.states.is_none() => from_bag(Path::new(bag), &patterns)?,
+            (0, _) => self.in_folders(&patterns)?,
+            (_, [bag]) if self.states.is_none() => in_bag(Path::new(bag), &patterns)?,
             _ => {
                 let problem = "a bag goes alone, with the states that it has itself";
                 return Err(Error::Unusable(problem.to_owned()));
@@ -118,7 +118,7 @@ impl Detect {
         Ok(patterns)
     }
 
-    fn from_folders(&self, patterns: &[Pattern]) -> Result<(Recording, Vec<String>), Error> {
+    fn in_folders(&self, patterns: &[Pattern]) -> Result<(Recording, Vec<String>), Error> {
         let mut folders = Vec::new();
         for image in &self.images {
             let named = image.split_once('=').filter(|_| !Path::new(image).exists());
@@ -167,7 +167,7 @@ impl Detect {
     }
 }
 
-fn from_bag(path: &Path, patterns: &[Pattern]) -> Result<(Recording, Vec<String>), Error> {
+fn in_bag(path: &Path, patterns: &[Pattern]) -> Result<(Recording, Vec<String>), Error> {
     let look = |bytes: &&[u8]| {
         let image = Gray::decode(bytes)?;
         Ok(patterns.iter().flat_map(|pattern| pattern.detect(&image)).collect())

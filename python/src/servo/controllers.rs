@@ -86,10 +86,10 @@ impl Controller {
 
     /// The command for the next ``dt`` seconds.
     ///
-    /// pixels: what is seen now. joints: readings, (n_joints,) [rad or m], where the robot gives any. time: when that was [s].
+    /// pixels: what is seen now; points: depth camera -> (n_features, 3) [m], likewise. joints: readings, (n_joints,) [rad or m], where the robot gives any. time: when that was [s].
     ///
     /// Raises ``NotDone`` where what is seen determines no motion: hold the robot, and decide again on what is seen next.
-    #[pyo3(signature = (pixels, joints = None, *, dt, time = 0.0, limits = None))]
+    #[pyo3(signature = (pixels, joints = None, *, dt, time = 0.0, limits = None, points = None))]
     fn decide(
         &self,
         pixels: &Bound<'_, PyDict>,
@@ -97,7 +97,9 @@ impl Controller {
         dt: f64,
         time: f64,
         limits: Option<Vec<Bound<'_, Limit>>>,
+        points: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Decision> {
+        let points = self.layout.points(points)?;
         let (mut seen, mut readings) = (Vec::with_capacity(32), Vec::new());
         self.layout.pixels(pixels, &mut seen)?;
         if let Some(joints) = joints {
@@ -105,7 +107,7 @@ impl Controller {
         }
         let limits: Vec<&dyn servo::Limit> =
             limits.iter().flatten().map(|limit| &limit.get().inner as &dyn servo::Limit).collect();
-        let now = Measurement { time, joints: &readings, seen: &seen };
+        let now = Measurement { time, joints: &readings, seen: &seen, points: &points };
         let inner = self.shared.lock().any().decide(&now, &limits, dt).map_err(raise)?;
         Ok(Decision { inner, rig: self.rig.clone() })
     }

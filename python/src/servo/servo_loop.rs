@@ -78,8 +78,9 @@ impl ServoLoop {
 
     /// What to do for the next ``dt`` seconds, at ``now`` [s] of the clock by which measurements are dated.
     ///
-    /// pixels: what was seen at ``time`` [s] (``now`` where left out); joints: readings, (n_joints,), where the robot gives any.
-    #[pyo3(signature = (now, pixels, joints = None, *, dt, time = None, limits = None))]
+    /// pixels: what was seen at ``time`` [s] (``now`` where left out); points: depth camera -> (n_features, 3) [m], likewise; joints: readings, (n_joints,), where the robot gives any.
+    #[expect(clippy::too_many_arguments, reason = "one keyword per measurement")]
+    #[pyo3(signature = (now, pixels, joints = None, *, dt, time = None, limits = None, points = None))]
     fn tick(
         &mut self,
         now: f64,
@@ -88,7 +89,9 @@ impl ServoLoop {
         dt: f64,
         time: Option<f64>,
         limits: Option<Vec<Bound<'_, Limit>>>,
+        points: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Tick> {
+        let points = self.layout.points(points)?;
         self.layout.pixels(pixels, &mut self.seen)?;
         self.joints.clear();
         if let Some(joints) = joints {
@@ -96,7 +99,8 @@ impl ServoLoop {
         }
         let limits: Vec<&dyn servo::Limit> =
             limits.iter().flatten().map(|limit| &limit.get().inner as &dyn servo::Limit).collect();
-        let measured = Measurement { time: time.unwrap_or(now), joints: &self.joints, seen: &self.seen };
+        let measured =
+            Measurement { time: time.unwrap_or(now), joints: &self.joints, seen: &self.seen, points: &points };
         let inner = self.inner.tick(now, &measured, &limits, dt).map_err(raise)?;
         Ok(Tick { inner, rig: self.rig.clone() })
     }
