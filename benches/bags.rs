@@ -16,6 +16,11 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
+#[path = "common/cdr.rs"]
+mod cdr;
+
+use cdr::Cdr;
+
 const JOINTS: [&str; 6] =
     ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"];
 const CAMERAS: [&str; 2] = ["left", "right"];
@@ -107,7 +112,7 @@ fn write(file: BufWriter<File>, compression: Option<Compression>, hertz: f64, se
     let mut put = |channel_id: u16, time: u64, cdr: Cdr| {
         let header = MessageHeader { channel_id, sequence: messages, log_time: time, publish_time: time };
         messages += 1;
-        writer.write_to_known_channel(&header, &cdr.0).expect("the bag can be written");
+        writer.write_to_known_channel(&header, &cdr.bytes).expect("the bag can be written");
     };
     let mut noise = Noise(1);
     let mut images = 0.0;
@@ -127,7 +132,7 @@ fn write(file: BufWriter<File>, compression: Option<Compression>, hertz: f64, se
 }
 
 fn joint_state(time: u64, noise: &mut Noise) -> Cdr {
-    let mut cdr = Cdr::header(time, "base_link");
+    let mut cdr = Cdr::stamped(time, "base_link");
     cdr.int(JOINTS.len() as u32);
     JOINTS.iter().for_each(|name| cdr.text(name));
     for _ in 0..3 {
@@ -138,7 +143,7 @@ fn joint_state(time: u64, noise: &mut Noise) -> Cdr {
 }
 
 fn camera_info(time: u64, frame: &str) -> Cdr {
-    let mut cdr = Cdr::header(time, frame);
+    let mut cdr = Cdr::stamped(time, frame);
     cdr.int(480);
     cdr.int(640);
     cdr.text("plumb_bob");
@@ -150,7 +155,7 @@ fn camera_info(time: u64, frame: &str) -> Cdr {
 }
 
 fn tags_seen(time: u64, frame: &str, noise: &mut Noise) -> Cdr {
-    let mut cdr = Cdr::header(time, frame);
+    let mut cdr = Cdr::stamped(time, frame);
     cdr.int(TAGS);
     for tag in 0..TAGS {
         cdr.text("tag36h11");
@@ -159,39 +164,6 @@ fn tags_seen(time: u64, frame: &str, noise: &mut Noise) -> Cdr {
         (0..19).for_each(|number| cdr.float(300.0 + 40.0 * f64::from(number) + noise.next()));
     }
     cdr
-}
-
-/// Numbers in CDR, little-endian.
-struct Cdr(Vec<u8>);
-
-impl Cdr {
-    fn header(time: u64, frame: &str) -> Cdr {
-        let mut cdr = Cdr(vec![0, 1, 0, 0]);
-        cdr.int((time / 1_000_000_000) as u32);
-        cdr.int((time % 1_000_000_000) as u32);
-        cdr.text(frame);
-        cdr
-    }
-
-    fn put(&mut self, bytes: &[u8]) {
-        let over = (self.0.len() - 4) % bytes.len();
-        self.0.resize(self.0.len() + (bytes.len() - over) % bytes.len(), 0);
-        self.0.extend_from_slice(bytes);
-    }
-
-    fn int(&mut self, number: u32) {
-        self.put(&number.to_le_bytes());
-    }
-
-    fn float(&mut self, number: f64) {
-        self.put(&number.to_le_bytes());
-    }
-
-    fn text(&mut self, text: &str) {
-        self.int(text.len() as u32 + 1);
-        self.0.extend_from_slice(text.as_bytes());
-        self.0.push(0);
-    }
 }
 
 /// Numbers of -1 to 1 that do not compress.

@@ -13,6 +13,11 @@ use std::io::{BufRead, BufReader, Write};
 use std::ops::ControlFlow;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
+#[path = "common/look.rs"]
+mod look;
+
+use look::look;
+
 /// Rigs that are learned, times that each is, and rounds of 2,000 steps.
 const RIGS: u64 = 7;
 const REPEATS: usize = 10;
@@ -87,15 +92,8 @@ impl Steps {
             (limits.lower, limits.upper, limits.velocity) = (Some(-50.0), Some(50.0), None);
         }
         let arm = Arm::new(&rig).expect("complete");
-        let look = |joints: &[f64]| -> Vec<Sighting> {
-            let mut at = Configuration::default();
-            arm.configure(joints, &mut at);
-            let pairs = (0..2).flat_map(|camera| (0..12).map(move |feature| (camera, feature)));
-            let see = |(camera, feature)| Some(Sighting { camera, feature, pixel: arm.pixel(&at, camera, feature)? });
-            pairs.filter_map(see).collect()
-        };
-        let goal = look(&places.pop().expect("asked for"));
-        let seen = places.iter().map(|joints| look(joints)).collect();
+        let goal = look(&arm, &places.pop().expect("asked for"));
+        let seen = places.iter().map(|joints| look(&arm, joints)).collect();
         let mut controller = ImageBased::new(&rig, ImageSettings::default()).expect("complete");
         controller.aim(&goal);
         let task = ImagePoints { targets: goal, seen: Vec::new(), sd: 1.0 };

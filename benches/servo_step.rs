@@ -12,6 +12,11 @@ use handeye::servo::{
 };
 use handeye::simulate::{SimulateOptions, random_rig, simulate};
 
+#[path = "common/look.rs"]
+mod look;
+
+use look::look;
+
 /// Steps that are timed.
 const STEPS: usize = 2_000;
 
@@ -106,17 +111,10 @@ fn image_based() -> Times {
         (joint.limits.lower, joint.limits.upper) = (Some(-50.0), Some(50.0));
     }
     let arm = Arm::new(&rig).expect("complete");
-    let look = |joints: &[f64]| -> Vec<Sighting> {
-        let mut at = Configuration::default();
-        arm.configure(joints, &mut at);
-        let pairs = (0..2).flat_map(|camera| (0..12).map(move |feature| (camera, feature)));
-        let see = |(camera, feature)| Some(Sighting { camera, feature, pixel: arm.pixel(&at, camera, feature)? });
-        pairs.filter_map(see).collect()
-    };
     let mut servo = ImageBased::new(&rig, ImageSettings::default()).expect("complete");
-    servo.aim(&look(&places.pop().expect("asked for")));
+    servo.aim(&look(&arm, &places.pop().expect("asked for")));
     Times::of(&places, |joints| {
-        let seen = look(joints);
+        let seen = look(&arm, joints);
         spent(|| assert!(!servo.step(&seen, joints, &[], 100.0).expect("the features are seen").failed))
     })
 }

@@ -1,11 +1,10 @@
 //! `handeye convert`: a bag or a table as a recording.
 use super::answer::Answer;
 use super::inputs::{check_output, read_camera};
-use super::words::count;
+use super::written::written;
 use clap::{Args, ValueEnum};
 use handeye::Error;
 use handeye::recording::{Actions, Angles, Bag, BagOptions, Format, Opened, Recording, Table, TableOptions};
-use serde_json::json;
 use std::path::PathBuf;
 
 /// Write a ROS 2 bag, a CSV file or a LeRobot dataset as a recording (JSON Lines)
@@ -128,27 +127,7 @@ impl Convert {
             Format::LeRobot => Table::read_lerobot(&self.input, &self.table.options(&self.joints)?)?.into(),
         };
         recording.write(&self.output)?;
-        let detections = recording.samples.iter().map(|sample| sample.pixels.len()).sum::<usize>();
-        let text = format!(
-            "{}: {} of {}, {} with {}, {}\n{}",
-            self.output.display(),
-            count(recording.samples.len(), "sample"),
-            count(recording.joints.len(), "joint"),
-            count(recording.cameras.len(), "camera"),
-            count(recording.features.len(), "feature"),
-            count(detections, "detection"),
-            notes.iter().map(|note| format!("  {note}\n")).collect::<String>()
-        );
-        let json = json!({
-            "output": self.output.display().to_string(),
-            "samples": recording.samples.len(),
-            "joints": recording.joints,
-            "cameras": recording.cameras.iter().map(|camera| &camera.name).collect::<Vec<_>>(),
-            "features": recording.features.len(),
-            "detections": detections,
-            "notes": notes,
-        });
-        Ok(Answer::new(text, json))
+        Ok(written(&self.output, &recording, &notes))
     }
 }
 

@@ -1,13 +1,12 @@
 //! `handeye detect`: images as a recording.
 use super::answer::Answer;
 use super::inputs::{check_output, read_camera};
-use super::words::count;
+use super::written::written;
 use clap::{Args, ValueEnum};
 use handeye::Error;
 use handeye::detect::{Folder, Gray, Pattern, detect_in_folders};
 use handeye::recording::{Bag, BagOptions, Format, Opened, Pairing, RecordedCamera, Recording};
 use rayon::prelude::*;
-use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// Find the corners of tags and boards in images, and write them as a recording (JSON Lines)
@@ -102,7 +101,7 @@ impl Detect {
             );
         }
         recording.write(&self.output)?;
-        Ok(self.answer(&recording, &notes))
+        Ok(written(&self.output, &recording, &notes))
     }
 
     fn patterns(&self) -> Result<Vec<Pattern>, Error> {
@@ -138,32 +137,6 @@ impl Detect {
             .map_err(|problem| Error::Unusable(format!("{file}: {problem}")))?;
         notes.extend(states.into_iter().flat_map(|Opened { notes, .. }| notes));
         Ok((recording, notes))
-    }
-
-    fn answer(&self, recording: &Recording, notes: &[String]) -> Answer {
-        let detections = recording.samples.iter().map(|sample| sample.pixels.len()).sum::<usize>();
-        let targets = recording.samples.iter().map(|sample| sample.targets.len()).sum::<usize>();
-        let text = format!(
-            "{}: {}, {} with {}, {}{}\n{}",
-            self.output.display(),
-            count(recording.samples.len(), "sample"),
-            count(recording.cameras.len(), "camera"),
-            count(recording.features.len(), "feature"),
-            count(detections, "detection"),
-            if targets > 0 { format!(", {}", count(targets, "target pose")) } else { String::new() },
-            notes.iter().map(|note| format!("  {note}\n")).collect::<String>()
-        );
-        let json = json!({
-            "output": self.output.display().to_string(),
-            "samples": recording.samples.len(),
-            "joints": recording.joints,
-            "cameras": recording.cameras.iter().map(|camera| &camera.name).collect::<Vec<_>>(),
-            "features": recording.features.len(),
-            "detections": detections,
-            "targets": targets,
-            "notes": notes,
-        });
-        Answer::new(text, json)
     }
 }
 

@@ -26,6 +26,7 @@ mod table;
 mod task;
 mod trust;
 mod words;
+mod written;
 
 use answer::{Answer, Refusal, print};
 use clap::Parser;

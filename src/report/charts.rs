@@ -29,13 +29,7 @@ pub(super) fn scatter(residuals: &[&Residual], sd: f64) -> String {
 
 /// Residuals where they were seen, `scale` times as long as they are.
 pub(super) fn map(residuals: &[&Residual], [width, height]: [f64; 2], scale: f64) -> String {
-    let mut svg = open(width, height);
-    let _ = write!(
-        svg,
-        "<rect class=\"axis\" x=\"0.5\" y=\"0.5\" width=\"{:.0}\" height=\"{:.0}\"/>",
-        width - 1.0,
-        height - 1.0
-    );
+    let mut svg = image(width, height);
     let (dot, line) = (width / 320.0, width / 500.0);
     for residual in residuals.iter().step_by(residuals.len().div_ceil(POINTS).max(1)) {
         let [u, v] = residual.seen;
@@ -189,13 +183,7 @@ pub(super) fn curve(curve: &Curve<'_>) -> String {
 
 /// The ways of the features in an image, where they shall be at the end, and a dot each that the page moves.
 pub(super) fn ways(moments: &[Moment], camera: u32, n_features: u32, [width, height]: [f64; 2]) -> String {
-    let mut svg = open(width, height);
-    let _ = write!(
-        svg,
-        "<rect class=\"axis\" x=\"0.5\" y=\"0.5\" width=\"{:.0}\" height=\"{:.0}\"/>",
-        width - 1.0,
-        height - 1.0
-    );
+    let mut svg = image(width, height);
     let (dot, line) = (width / 130.0, width / 600.0);
     for feature in 0..n_features {
         let is_it = |detection: &&Detection| (detection.camera, detection.feature) == (camera, feature);
@@ -224,4 +212,11 @@ pub(super) fn ways(moments: &[Moment], camera: u32, n_features: u32, [width, hei
 
 fn open(width: f64, height: f64) -> String {
     format!("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width:.0} {height:.0}\" role=\"img\">")
+}
+
+/// A drawing of an image's size [px] with its border.
+fn image(width: f64, height: f64) -> String {
+    let [right, bottom] = [width - 1.0, height - 1.0];
+    open(width, height)
+        + &format!("<rect class=\"axis\" x=\"0.5\" y=\"0.5\" width=\"{right:.0}\" height=\"{bottom:.0}\"/>")
 }

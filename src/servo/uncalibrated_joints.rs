@@ -1,8 +1,8 @@
 //! Servoing joints to pixels without a rig, or with one that may be outdated.
 use super::rig_foresight::RigForesight;
 use super::tracker_watch::TrackerWatch;
-use super::uncalibrated::{Phase, Quantity, Row, Settings, Stop as Gave, Uncalibrated};
-use super::{Arm, Configuration, Controller, Decision, Limit, LimitRows, Measurement, Stop, Takes};
+use super::uncalibrated::{Phase, Quantity, Row, Settings, Uncalibrated, not_read, stop_of};
+use super::{Arm, Configuration, Controller, Decision, Limit, LimitRows, Measurement, Takes};
 use crate::Error;
 use crate::infer::Sighting;
 use crate::recording::Command;
@@ -35,6 +35,8 @@ pub struct UncalibratedJoints {
     /// Where the joints are, as read or as commanded so far [rad or m].
     joints: Vec<f64>,
     commanded: Vec<f64>,
+    /// Whether joints were read when servoing began.
+    is_read: bool,
 }
 
 /// Rows of the thesis's tasks, to which [`Settings::divergence`] refers here.
@@ -66,6 +68,7 @@ impl UncalibratedJoints {
             errors: Vec::new(),
             joints: Vec::new(),
             commanded: vec![0.0; n],
+            is_read: false,
         })
     }
 
@@ -102,7 +105,7 @@ impl UncalibratedJoints {
     }
 
     /// Begins with the features of the goal that are seen.
-    fn begin(&mut self, seen: &[Sighting]) -> Result<(), Error> {
+    fn begin(&mut self, seen: &[Sighting], is_read: bool) -> Result<(), Error> {
         self.rows = self.goal.iter().filter(|goal| find(seen, goal).is_some()).copied().collect();
         let (n, m) = (self.quantities.len(), 2 * self.rows.len());
         if m < n {
@@ -116,7 +119,13 @@ impl UncalibratedJoints {
         // The divergence of the thesis is one of 12 rows.
         let divergence = self.settings.divergence * f64::max(1.0, m as f64 / ROWS);
         let settings = Settings { divergence, ..self.settings.clone() };
-        let mut servo = Uncalibrated::new(self.quantities.clone(), rows, settings)?;
+        let mut quantities = self.quantities.clone();
+        if !is_read {
+            // Nobody knows how far it is to the ends of joints that are not read; the robot stops at them.
+            quantities.iter_mut().for_each(|one| (one.limits.lower, one.limits.upper) = (None, None));
+        }
+        self.is_read = is_read;
+        let mut servo = Uncalibrated::new(quantities, rows, settings)?;
         if let Some((rig, _)) = &self.rig {
             servo.begin_with_model(Box::new(RigForesight::new(rig, &self.rows)?));
         }
@@ -186,10 +195,15 @@ impl Controller for UncalibratedJoints {
     }
 
     fn decide(&mut self, now: &Measurement<'_>, limits: &[&dyn Limit], dt: f64) -> Result<Decision, Error> {
+        let is_read = !now.joints.is_empty();
+        // A sum of motions stands for readings of a robot that reads nothing: it is where no joint is, and takes the place of none.
+        if !is_read && (self.is_read || self.takes == Takes::Joints || self.rig.is_some()) {
+            return Err(not_read());
+        }
         self.joints.clear();
-        self.joints.extend(if now.joints.is_empty() { &self.commanded } else { now.joints });
+        self.joints.extend(if is_read { now.joints } else { &self.commanded });
         if self.servo.is_none() {
-            self.begin(now.seen)?;
+            self.begin(now.seen, is_read)?;
         }
         if self.joints.iter().all(|joint| joint.is_finite()) && self.joints.len() == self.quantities.len() {
             self.limit(limits, dt)?;
@@ -211,17 +225,9 @@ impl Controller for UncalibratedJoints {
             (2 * tracker..2 * tracker + 2).for_each(|row| servo.give_up(row));
         }
         self.watch.moves_from(&self.joints);
-        let stop = match phase {
-            Phase::Waiting(why) => return Err(Error::NotEnoughData(why)),
-            Phase::Stopped(Gave::Undetermined(why)) => Some(Stop::Undetermined { why }),
-            Phase::Stopped(Gave::Diverged { growth }) => {
-                let n = self.rows.len().max(1) as f64;
-                let sizes = self.errors.chunks(2).map(|error| error[0].hypot(error[1])).filter(|size| size.is_finite());
-                let error_px = sizes.sum::<f64>() / n;
-                Some(Stop::Diverged { from_px: (error_px - growth / n).max(0.0), error_px })
-            }
-            Phase::Exploring | Phase::Servoing | Phase::Converged => None,
-        };
+        let mut sizes: Vec<f64> = self.errors.chunks(2).map(|error| error[0].hypot(error[1])).collect();
+        sizes.retain(|size| size.is_finite());
+        let stop = stop_of(&phase, sizes.iter().sum::<f64>() / sizes.len().max(1) as f64, sizes.len())?;
         let explores = self.phase() == Some(&Phase::Exploring);
         self.commanded.iter_mut().zip(&motion).for_each(|(at, by)| *at += by);
         let command = if stop.is_some() { Command::Hold } else { self.command(&motion, dt)? };

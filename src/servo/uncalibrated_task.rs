@@ -1,8 +1,8 @@
 //! Carrying out a task in images without a rig.
 use super::image_tasks::{ImageTask, Place, Seen};
 use super::target_watch::TargetWatch;
-use super::uncalibrated::{Phase, Quantity, Row, Settings, Stop as Gave, Uncalibrated};
-use super::{Controller, Decision, Limit, LimitRows, Measurement, Stop, Takes};
+use super::uncalibrated::{Phase, Quantity, Row, Settings, Uncalibrated, not_read, stop_of};
+use super::{Controller, Decision, Limit, LimitRows, Measurement, Takes};
 use crate::Error;
 use crate::infer::Sighting;
 use crate::recording::Command;
@@ -144,7 +144,7 @@ impl Controller for UncalibratedTask {
         let moves_joints = !matches!(self.takes, Takes::PoseDelta | Takes::PoseVelocity);
         let is_read = moves_joints && !now.joints.is_empty();
         if !is_read && (self.is_read || self.takes == Takes::Joints) {
-            return Err(Error::NotEnoughData("the joints are not read, or not as numbers".to_owned()));
+            return Err(not_read());
         }
         self.readings.clear();
         self.readings.extend(if is_read { now.joints } else { &self.commanded });
@@ -174,17 +174,9 @@ impl Controller for UncalibratedTask {
         let told = servo.step(&self.readings, &self.errors, &self.limits, dt)?;
         let (phase, motion) = (told.phase.clone(), told.motion.to_vec());
         let (active, conflict) = (told.active.to_vec(), told.conflict.to_vec());
-        let stop = match &phase {
-            Phase::Waiting(why) => return Err(Error::NotEnoughData(why.clone())),
-            Phase::Stopped(Gave::Undetermined(why)) => Some(Stop::Undetermined { why: why.clone() }),
-            Phase::Stopped(Gave::Diverged { growth }) => {
-                let seen: Vec<f64> = self.errors.iter().map(|error| error.abs()).filter(|x| x.is_finite()).collect();
-                let n = seen.len().max(1) as f64;
-                let error_px = seen.iter().sum::<f64>() / n;
-                Some(Stop::Diverged { from_px: (error_px - growth / n).max(0.0), error_px })
-            }
-            Phase::Exploring | Phase::Servoing | Phase::Converged => None,
-        };
+        let mut seen: Vec<f64> = self.errors.iter().map(|error| error.abs()).collect();
+        seen.retain(|error| error.is_finite());
+        let stop = stop_of(&phase, seen.iter().sum::<f64>() / seen.len().max(1) as f64, seen.len())?;
         self.commanded.iter_mut().zip(&motion).for_each(|(at, by)| *at += by);
         let command = if stop.is_some() { Command::Hold } else { self.command(&motion, dt) };
         let explores = phase == Phase::Exploring;

@@ -9,6 +9,11 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::Path;
 
+#[path = "../../benches/common/cdr.rs"]
+pub mod cdr;
+
+use cdr::Cdr;
+
 const HEADER: &str = "std_msgs/Header header\n";
 const HEADER_PARTS: &str = "================================================================================\n\
     MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n\
@@ -26,57 +31,14 @@ const TAGS_PARTS: &str = "======================================================
     ================================================================================\n\
     MSG: apriltag_msgs/Point\nfloat64 x\nfloat64 y\n";
 
-/// Numbers and texts in CDR, little-endian.
-struct Cdr(Vec<u8>);
-
-impl Cdr {
-    fn new() -> Cdr {
-        Cdr(vec![0, 1, 0, 0])
-    }
-
-    fn put(&mut self, bytes: &[u8]) {
-        while !(self.0.len() - 4).is_multiple_of(bytes.len()) {
-            self.0.push(0);
-        }
-        self.0.extend_from_slice(bytes);
-    }
-
-    fn int(&mut self, number: u32) {
-        self.put(&number.to_le_bytes());
-    }
-
-    fn float(&mut self, number: f64) {
-        self.put(&number.to_le_bytes());
-    }
-
-    fn text(&mut self, text: &str) {
-        self.int(text.len() as u32 + 1);
-        self.0.extend_from_slice(text.as_bytes());
-        self.0.push(0);
-    }
-
-    fn floats(&mut self, numbers: &[f64]) {
-        self.int(numbers.len() as u32);
-        numbers.iter().for_each(|number| self.float(*number));
-    }
-
-    fn header(stamp: u64, frame: &str) -> Cdr {
-        let mut cdr = Cdr::new();
-        cdr.int((stamp / 1_000_000_000) as u32);
-        cdr.int((stamp % 1_000_000_000) as u32);
-        cdr.text(frame);
-        cdr
-    }
-}
-
 fn joint_state(stamp: u64, names: &[String], positions: &[f64]) -> Vec<u8> {
-    let mut cdr = Cdr::header(stamp, "");
+    let mut cdr = Cdr::stamped(stamp, "");
     cdr.int(names.len() as u32);
     names.iter().for_each(|name| cdr.text(name));
-    cdr.floats(positions);
-    cdr.floats(&[]);
-    cdr.floats(&[]);
-    cdr.0
+    cdr.sequence(positions);
+    cdr.sequence(&[]);
+    cdr.sequence(&[]);
+    cdr.bytes
 }
 
 /// When each sample is, the states before and after it, and the order of the joints in a state [ns].
@@ -109,17 +71,17 @@ fn bag(recording: &Recording, options: WriteOptions, shuffled: bool) -> Vec<u8> 
     };
     for (camera, (info, _)) in recording.cameras.iter().zip(&cameras) {
         let [width, height] = camera.size.unwrap();
-        let mut cdr = Cdr::header(0, &camera.name);
+        let mut cdr = Cdr::stamped(0, &camera.name);
         cdr.int(height);
         cdr.int(width);
         cdr.text("plumb_bob");
-        cdr.floats(&[0.0; 5]);
+        cdr.sequence(&[0.0; 5]);
         let k = [camera.fx, camera.cx, camera.fy, camera.cy].map(Option::unwrap);
         [k[0], 0.0, k[1], 0.0, k[2], k[3], 0.0, 0.0, 1.0].iter().for_each(|number| cdr.float(*number));
         (0..21).for_each(|_| cdr.float(0.0));
         (0..6).for_each(|_| cdr.int(0));
-        cdr.0.push(0);
-        write(*info, 1, &cdr.0);
+        cdr.byte(0);
+        write(*info, 1, &cdr.bytes);
     }
     let mut order: Vec<usize> = (0..recording.joints.len()).collect();
     if shuffled {
@@ -136,7 +98,7 @@ fn bag(recording: &Recording, options: WriteOptions, shuffled: bool) -> Vec<u8> 
             let tags_seen: Vec<u32> = (0..recording.features.len() as u32 / 4)
                 .filter(|tag| (0..4).all(|corner| seen.iter().any(|seen| seen.feature == 4 * tag + corner)))
                 .collect();
-            let mut cdr = Cdr::header(stamp, &recording.cameras[camera].name);
+            let mut cdr = Cdr::stamped(stamp, &recording.cameras[camera].name);
             cdr.int(tags_seen.len() as u32);
             for tag in tags_seen {
                 cdr.text("tag36h11");
@@ -151,7 +113,7 @@ fn bag(recording: &Recording, options: WriteOptions, shuffled: bool) -> Vec<u8> 
                 }
                 (0..9).for_each(|_| cdr.float(0.0));
             }
-            write(*tags, stamp, &cdr.0);
+            write(*tags, stamp, &cdr.bytes);
         }
     }
     writer.finish().unwrap();
@@ -209,12 +171,12 @@ fn images_beside(n: u64, others: &[(&str, &str, String, u64, Vec<u8>)]) -> Vec<u
     let tags = format!("{HEADER}{TAGS}{HEADER_PARTS}{TAGS_PARTS}");
     for index in 0..n {
         let stamp = 1_000_000_000 + EVERY * index;
-        let mut cdr = Cdr::header(stamp, "left");
+        let mut cdr = Cdr::stamped(stamp, "left");
         cdr.int(1);
         cdr.text("tag36h11");
         (0..4).for_each(|_| cdr.int(0));
         (0..19).for_each(|number| cdr.float(f64::from(number)));
-        write("/left/tags", "apriltag_msgs/msg/AprilTagDetectionArray", &tags, stamp, &cdr.0);
+        write("/left/tags", "apriltag_msgs/msg/AprilTagDetectionArray", &tags, stamp, &cdr.bytes);
     }
     for (topic, kind, text, time, data) in others {
         write(topic, kind, text, *time, data);
@@ -229,14 +191,14 @@ fn put_pose(cdr: &mut Cdr, xyz: [f64; 3], angle: f64) {
 }
 
 fn transform(parent: &str, child: &str, time: u64, xyz: [f64; 3], angle: f64) -> Vec<u8> {
-    let mut cdr = Cdr::new();
+    let mut cdr = Cdr::new(false);
     cdr.int(1);
     cdr.int((time / 1_000_000_000) as u32);
     cdr.int((time % 1_000_000_000) as u32);
     cdr.text(parent);
     cdr.text(child);
     put_pose(&mut cdr, xyz, angle);
-    cdr.0
+    cdr.bytes
 }
 
 #[test]
@@ -252,9 +214,9 @@ fn states_are_interpolated_to_the_stamps_of_images_and_those_outside_are_left_op
         let part = index as f64;
         let joints = joint_state(time, &names, &[part, 10.0 - 2.0 * part]);
         others.push(("/joint_states", "sensor_msgs/msg/JointState", state.clone(), time, joints));
-        let mut cdr = Cdr::header(time, "base");
+        let mut cdr = Cdr::stamped(time, "base");
         put_pose(&mut cdr, [part, 0.0, 2.0], part);
-        others.push(("/tip", "geometry_msgs/msg/PoseStamped", pose_text.clone(), time, cdr.0));
+        others.push(("/tip", "geometry_msgs/msg/PoseStamped", pose_text.clone(), time, cdr.bytes));
     }
     let joints = vec!["a".to_owned(), "b".to_owned()];
     let options = BagOptions { joints, pose_topic: Some("tip".to_owned()), ..BagOptions::default() };

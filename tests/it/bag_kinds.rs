@@ -1,7 +1,5 @@
 //! Messages of bags in the forms that writers give them: both byte orders, both generations of Detection2D.
-//!
-//! Bytes are put together by the rules of CDR: every number stands at a multiple of its size, counted from behind the four bytes of the
-//! header, whose second byte is 0 for big-endian and 1 for little-endian.
+use crate::bag::cdr::Cdr;
 use crate::cli::Folder;
 use handeye::camera::CameraModel;
 use handeye::recording::{Bag, BagOptions};
@@ -14,60 +12,6 @@ const LINE: &str = "============================================================
 const STANDARD: &str = "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n\
     ================================================================================\n\
     MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n";
-
-struct Cdr {
-    is_big: bool,
-    bytes: Vec<u8>,
-}
-
-impl Cdr {
-    fn new(is_big: bool) -> Cdr {
-        Cdr { is_big, bytes: vec![0, u8::from(!is_big), 0, 0] }
-    }
-
-    /// `bytes`: a number, its lowest byte first.
-    fn number<const N: usize>(&mut self, mut bytes: [u8; N]) {
-        while !(self.bytes.len() - 4).is_multiple_of(N) {
-            self.bytes.push(0xee);
-        }
-        if self.is_big {
-            bytes.reverse();
-        }
-        self.bytes.extend_from_slice(&bytes);
-    }
-
-    fn byte(&mut self, byte: u8) {
-        self.bytes.push(byte);
-    }
-
-    fn short(&mut self, number: u16) {
-        self.number(number.to_le_bytes());
-    }
-
-    fn int(&mut self, number: u32) {
-        self.number(number.to_le_bytes());
-    }
-
-    fn half(&mut self, number: f32) {
-        self.number(number.to_le_bytes());
-    }
-
-    fn floats(&mut self, numbers: &[f64]) {
-        numbers.iter().for_each(|number| self.number(number.to_le_bytes()));
-    }
-
-    fn text(&mut self, text: &str) {
-        self.int(text.len() as u32 + 1);
-        self.bytes.extend_from_slice(text.as_bytes());
-        self.byte(0);
-    }
-
-    fn header(&mut self, sec: u32, nanosec: u32, frame: &str) {
-        self.int(sec);
-        self.int(nanosec);
-        self.text(frame);
-    }
-}
 
 /// Reads a bag of these messages: topic, type, schema, bytes.
 fn read(folder: &Folder, messages: &[(&str, &str, String, Cdr)]) -> Result<Bag, handeye::Error> {
@@ -179,8 +123,9 @@ fn an_encoding_that_is_not_plain_cdr_is_named() {
 /// A detection: id, class, centre.
 type Seen<'a> = (&'a str, &'a str, [f64; 2]);
 
-/// A Detection2DArray as vision_msgs 4 has it (ROS 2 from Galactic on).
-fn new_detections(is_big: bool, stamp: u32, seen: &[Seen]) -> Cdr {
+/// A Detection2DArray as vision_msgs 4 has it (ROS 2 from Galactic on), or as 2 and 3 have it: the centre without a position, the class as
+/// the id of a result, no id of its own.
+fn detections(is_new: bool, is_big: bool, stamp: u32, seen: &[Seen]) -> Cdr {
     let mut cdr = Cdr::new(is_big);
     cdr.header(stamp, 0, "camera");
     cdr.int(seen.len() as u32);
@@ -192,26 +137,12 @@ fn new_detections(is_big: bool, stamp: u32, seen: &[Seen]) -> Cdr {
         cdr.floats(&[0.0; 7 + 36]);
         cdr.floats(centre);
         cdr.floats(&[0.0, 12.0, 9.0]);
-        cdr.text(id);
-    }
-    cdr
-}
-
-/// The same as vision_msgs 2 and 3 have it: the centre without a position, the class as the id of a result, no id of its own.
-fn old_detections(is_big: bool, stamp: u32, seen: &[Seen]) -> Cdr {
-    let mut cdr = Cdr::new(is_big);
-    cdr.header(stamp, 0, "camera");
-    cdr.int(seen.len() as u32);
-    for (_, class, centre) in seen {
-        cdr.header(stamp, 0, "");
-        cdr.int(1);
-        cdr.text(class);
-        cdr.floats(&[0.875]);
-        cdr.floats(&[0.0; 7 + 36]);
-        cdr.floats(centre);
-        cdr.floats(&[0.0, 12.0, 9.0]);
-        cdr.byte(1);
-        cdr.text("never looked at");
+        if is_new {
+            cdr.text(id);
+        } else {
+            cdr.byte(1);
+            cdr.text("never looked at");
+        }
     }
     cdr
 }
@@ -256,8 +187,8 @@ fn detections_are_called_by_their_id_or_by_what_they_are_most_probably_of() {
     let kind = "vision_msgs/msg/Detection2DArray";
     for is_big in [false, true] {
         let messages = [
-            ("/seen", kind, new_schema(), new_detections(is_big, 3, &first)),
-            ("/seen", kind, new_schema(), new_detections(is_big, 4, &second)),
+            ("/seen", kind, new_schema(), detections(true, is_big, 3, &first)),
+            ("/seen", kind, new_schema(), detections(true, is_big, 4, &second)),
         ];
         let bag = read(&folder, &messages).unwrap();
         // A point separates the parts of parameter paths, so that names cannot hold it.
@@ -268,7 +199,7 @@ fn detections_are_called_by_their_id_or_by_what_they_are_most_probably_of() {
         let said = bag.notes.join("\n");
         assert!(said.contains("1 detections are no numbers, and are left out"), "{said}");
 
-        let messages = [("/seen", kind, old_schema(), old_detections(is_big, 3, &first))];
+        let messages = [("/seen", kind, old_schema(), detections(false, is_big, 3, &first))];
         let bag = read(&folder, &messages).unwrap();
         assert_eq!(seen(&bag, 0), [("bolt", [100.5, 200.25]), ("nut", [7.0, 8.5])]);
     }

@@ -208,6 +208,42 @@ fn a_robot_with_a_dead_band_or_without_readings_arrives_too() {
 }
 
 #[test]
+fn a_reading_that_is_no_number_holds_the_arm_and_teaches_nothing() {
+    for seed in 1..=10 {
+        let (rig, start, target) = rig_and_way(seed, 0.2);
+        let random = &mut ChaCha8Rng::seed_from_u64(seed);
+        let mut world = World::new(&rig, &start, noisy(seed)).unwrap();
+        let names = Names::new(&rig, world.header());
+        let aimed_at = goal(&world, &names, &target);
+        let mut servo = ServoLoop::new(none(&rig), settings());
+        servo.aim(&aimed_at);
+        let mut told = [0; 2];
+        let stop = loop {
+            let sample = world.look();
+            let (mut joints, seen) = (sample.joints.clone().unwrap(), names.sightings(&sample));
+            let is_lost = random.random::<f64>() < 0.1;
+            if is_lost {
+                joints[2] = f64::NAN;
+            }
+            let now = Measurement { time: world.time(), joints: &joints, seen: &seen, points: &[] };
+            let tick = servo.tick(world.time(), &now, &[], 1.0).unwrap();
+            if let Some(stop) = tick.stop {
+                break stop;
+            }
+            assert!(!is_lost || tick.command == Command::Hold, "seed {seed}: moves without a reading");
+            told[usize::from(is_lost)] += 1;
+            world.execute(&tick.command, 1.0).unwrap();
+        };
+        let error_px = distance(&goal(&world, &names, world.joints()), &aimed_at);
+        assert!(
+            !matches!(stop, Stop::Diverged { .. } | Stop::Lost { .. }) && error_px < 4.0,
+            "seed {seed}: {stop:?}, {error_px} px"
+        );
+        assert!(told[1] > 0, "seed {seed}: {told:?}");
+    }
+}
+
+#[test]
 fn a_target_that_moves_keeps_what_was_learned() {
     let (rig, start, target) = rig_and_way(2, 0.2);
     let mut world = World::new(&rig, &start, noisy(1)).unwrap();
@@ -276,6 +312,9 @@ fn what_it_cannot_do_is_said() {
     let mut controller = none(&rig);
     controller.aim(&aimed_at);
     refused(controller.decide(&now(&seen[..2]), &[], 1.0).unwrap_err(), "2 of the 24 features");
+    controller.takes = Takes::Joints;
+    refused(controller.decide(&Measurement { joints: &[], ..now(&seen) }, &[], 1.0).unwrap_err(), "not read");
+    controller.takes = Takes::JointDelta;
     let limit = TipSpeed { speed: 1.0, strength: 10.0 };
     let limits: [&dyn Limit; 1] = [&limit];
     refused(controller.decide(&now(&seen), &limits, 1.0).unwrap_err(), "need a rig");

@@ -5,7 +5,7 @@ use handeye::simulate::world::{
     Coupling, Drone, Execution, Object, Slip, Spring, SpringArm, Table, Tracker, World, WorldOptions,
 };
 use handeye::solvers::Pose;
-use handeye::solvers::nalgebra::{Matrix3, Vector3};
+use handeye::solvers::nalgebra::{Matrix3, Rotation3, Vector3};
 
 const START: [f64; 6] = [0.0, -1.3, 1.2, -1.5, -1.6, 0.3];
 
@@ -175,22 +175,11 @@ fn the_line_below_a_drone_is_where_projecting_its_points_has_it() {
         let [ahead, behind] = drone.line().unwrap();
         assert!(((ahead[0] - behind[0]).hypot(ahead[1] - behind[1]) - 200.0).abs() < 1e-9);
         // Forward, right and down of the drone as turns of heading, pitch and roll have them (Tait-Bryan, z down).
-        let [(sy, cy), (sp, cp), (sr, cr)] = [(-yaw).sin_cos(), (-lean[0]).sin_cos(), lean[1].sin_cos()];
-        let north_east_down = Matrix3::new(
-            cy * cp,
-            cy * sp * sr - sy * cr,
-            cy * sp * cr + sy * sr,
-            sy * cp,
-            sy * sp * sr + cy * cr,
-            sy * sp * cr - cy * sr,
-            -sp,
-            cp * sr,
-            cp * cr,
-        );
+        let north_east_down = Rotation3::from_euler_angles(lean[1], -lean[0], -yaw);
         let see = |x: f64| {
             // North is the line, east to its right.
             let away = Vector3::new(x - 3.0, 0.2, 1.5);
-            let body = north_east_down.transpose() * away;
+            let body = north_east_down.inverse() * away;
             [320.0 + 560.0 * body.y / body.z, 180.0 - 560.0 * body.x / body.z]
         };
         for x in [2.8, 3.0, 3.3] {

@@ -1,15 +1,15 @@
 //! Controllers: from what is seen to what the robot shall do.
+use super::decision::Decision;
 use super::limits::Limit;
-use super::servo_loop::Stop;
-use super::step::{Active, read};
-use crate::arrays::{Floats, array, homogeneous, list, vector};
+use super::step::read;
+use crate::arrays::{Floats, list, vector};
 use crate::errors::{raise, unusable};
 use crate::rig::Rig;
 use crate::sight::Layout;
 use handeye::infer::Sighting;
 use handeye::rig::{self, Joint, Limits};
 use handeye::servo::uncalibrated::Settings;
-use handeye::servo::{self, Command, Gain, ImageSettings, InteractionMatrix, Measurement, PoseSettings, Takes};
+use handeye::servo::{self, Gain, ImageSettings, InteractionMatrix, Measurement, PoseSettings, Takes};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -334,94 +334,4 @@ fn by_name<T: Copy>(what: &str, name: &str, all: &[T], name_of: fn(T) -> &'stati
         let known: Vec<&str> = all.iter().map(|one| name_of(*one)).collect();
         unusable(format!("{what}: unknown `{name}` (known: {})", known.join(", ")))
     })
-}
-
-/// A command, and what holds it back.
-#[pyclass(module = "handeye.servo", frozen)]
-pub struct Decision {
-    inner: servo::Decision,
-    rig: Arc<rig::Rig>,
-}
-
-#[pymethods]
-impl Decision {
-    /// What the robot shall do.
-    #[getter]
-    fn command(&self) -> MotionCommand {
-        MotionCommand { inner: self.inner.command.clone() }
-    }
-
-    /// What holds it back.
-    #[getter]
-    fn active(&self) -> Vec<Active> {
-        self.inner.active.iter().map(|active| Active::new(active, &self.rig)).collect()
-    }
-
-    /// Constraints that cannot all hold, where a limit gave way, in words.
-    #[getter]
-    fn conflict(&self) -> Vec<String> {
-        self.inner.conflict.iter().map(|constraint| constraint.words(&self.rig, &[])).collect()
-    }
-
-    /// Features whose trackers are not believed, as indices of camera and feature.
-    #[getter]
-    fn left_out(&self) -> Vec<(usize, usize)> {
-        self.inner.left_out.clone()
-    }
-
-    /// True where the motion is to learn from and not to arrive.
-    #[getter]
-    fn explores(&self) -> bool {
-        self.inner.explores
-    }
-
-    /// Why the controller gives up, where it does.
-    #[getter]
-    fn stop(&self) -> Option<Stop> {
-        self.inner.stop.as_ref().map(|stop| Stop::new(stop, &self.rig))
-    }
-
-    fn __repr__(&self) -> String {
-        format!("<handeye.servo.Decision {:?}, {} constraints active>", self.inner.command, self.inner.active.len())
-    }
-}
-
-/// What a robot is told to do until the next command.
-#[pyclass(module = "handeye.servo", frozen)]
-pub struct MotionCommand {
-    pub inner: Command,
-}
-
-#[pymethods]
-impl MotionCommand {
-    /// ``"hold"``, ``"joints"``, ``"joint-deltas"``, ``"joint-velocities"``, ``"pose-deltas"`` or ``"pose-velocities"``.
-    #[getter]
-    fn kind(&self) -> &'static str {
-        match self.inner {
-            Command::Hold => "hold",
-            Command::Joints(_) => Takes::Joints.name(),
-            Command::JointDelta(_) => Takes::JointDelta.name(),
-            Command::JointVelocity(_) => Takes::JointVelocity.name(),
-            Command::PoseDelta(_) => Takes::PoseDelta.name(),
-            Command::PoseVelocity(_) => Takes::PoseVelocity.name(),
-        }
-    }
-
-    /// One number per joint [rad or m, or per second]; for poses a motion A of the world, P_next = A P, (4, 4), or a velocity (6,):
-    /// angular [rad/s], then linear [m/s]; ``None`` to hold.
-    #[getter]
-    fn value<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyAny>> {
-        match &self.inner {
-            Command::Hold => None,
-            Command::Joints(numbers) | Command::JointDelta(numbers) | Command::JointVelocity(numbers) => {
-                Some(vector(py, numbers).into_any())
-            }
-            Command::PoseDelta(pose) => Some(homogeneous(py, pose).into_any()),
-            Command::PoseVelocity(twist) => Some(array(py, &[6], twist.to_vec()).into_any()),
-        }
-    }
-
-    fn __repr__(&self) -> String {
-        format!("<handeye.servo.MotionCommand {:?}>", self.inner)
-    }
 }

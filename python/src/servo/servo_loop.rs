@@ -1,7 +1,9 @@
 //! The closed loop around a controller.
-use super::controllers::{Controller, MotionCommand, Shared};
+use super::controllers::{Controller, Shared};
+use super::decision::{MotionCommand, Stop};
+use super::held_back::{Active, words_of};
 use super::limits::Limit;
-use super::step::{Active, read};
+use super::step::read;
 use crate::errors::raise;
 use crate::sight::Layout;
 use handeye::infer::Sighting;
@@ -130,13 +132,13 @@ impl Tick {
     /// What holds the motion back.
     #[getter]
     fn active(&self) -> Vec<Active> {
-        self.inner.active.iter().map(|active| Active::new(active, &self.rig)).collect()
+        Active::all(&self.inner.active, &self.rig)
     }
 
     /// Constraints that cannot all hold, where a limit gave way, in words.
     #[getter]
     fn conflict(&self) -> Vec<String> {
-        self.inner.conflict.iter().map(|constraint| constraint.words(&self.rig, &[])).collect()
+        words_of(&self.inner.conflict, &self.rig)
     }
 
     /// Why the robot is held, while the loop goes on.
@@ -155,33 +157,5 @@ impl Tick {
         let error = self.inner.error_px.map_or_else(|| "nothing seen".to_owned(), |error| format!("{error:.3} px"));
         let stop = self.inner.stop.as_ref().map_or_else(String::new, |stop| format!(", stopped: {}", stop.name()));
         format!("<handeye.servo.Tick {error}, {:?}{stop}>", self.inner.command)
-    }
-}
-
-/// Why a loop moves no more.
-#[pyclass(module = "handeye.servo", frozen, get_all)]
-pub struct Stop {
-    /// ``"converged"``, ``"no-better"``, ``"blocked"``, ``"diverged"``, ``"undetermined"``, ``"lost"`` or ``"timed-out"``.
-    name: &'static str,
-    /// True where the features are as near as they can be brought.
-    is_success: bool,
-    /// In words.
-    words: String,
-}
-
-impl Stop {
-    pub fn new(stop: &servo::Stop, rig: &rig::Rig) -> Self {
-        Stop { name: stop.name(), is_success: stop.is_success(), words: stop.words(rig, &[]) }
-    }
-}
-
-#[pymethods]
-impl Stop {
-    fn __str__(&self) -> &str {
-        &self.words
-    }
-
-    fn __repr__(&self) -> String {
-        format!("<handeye.servo.Stop {}>", self.words)
     }
 }

@@ -1,12 +1,12 @@
 //! One step towards goals, under limits.
+use super::held_back::{Active, words_of};
 use super::limits::Limit;
 use super::tasks::Task;
 use crate::arrays::{Floats, NewArray, array, list, vector};
 use crate::errors::{raise, unusable};
 use crate::rig::Rig;
-use crate::sight::Layout;
 use handeye::rig;
-use handeye::servo::{self, Arm, Configuration, Constraint};
+use handeye::servo::{self, Arm, Configuration};
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use std::sync::Arc;
@@ -145,13 +145,13 @@ impl Step {
     /// What holds the motion back.
     #[getter]
     fn active(&self) -> Vec<Active> {
-        self.inner.active.iter().map(|active| Active::new(active, &self.rig)).collect()
+        Active::all(&self.inner.active, &self.rig)
     }
 
     /// Where a limit gave way: constraints that cannot all hold, though without any one of them the others can, in words.
     #[getter]
     fn conflict(&self) -> Vec<String> {
-        self.inner.conflict.iter().map(|constraint| constraint.words(&self.rig, &[])).collect()
+        words_of(&self.inner.conflict, &self.rig)
     }
 
     /// True where numbers were not finite or the step broke down: hold the robot then.
@@ -164,71 +164,5 @@ impl Step {
         let servo::Step { motion, active, failed, .. } = &self.inner;
         let failed = if *failed { ", FAILED" } else { "" };
         format!("<handeye.servo.Step {motion:.5?}, {} constraints active{failed}>", active.len())
-    }
-}
-
-/// A constraint that holds a motion back.
-#[pyclass(module = "handeye.servo", frozen, get_all)]
-pub struct Active {
-    /// Which, in words.
-    constraint: String,
-    /// The joint whose bound it is, by name; ``None`` for a limit.
-    joint: Option<String>,
-    /// Index of the limit in the list that was given; ``None`` for a joint's bound.
-    limit: Option<usize>,
-    /// How much the cost would fall per unit that it were wider.
-    multiplier: f64,
-    /// How far it gave way, in its own unit; 0 where it holds.
-    slack: f64,
-}
-
-impl Active {
-    pub fn new(active: &servo::Active, rig: &rig::Rig) -> Self {
-        let (joint, limit) = match active.constraint {
-            Constraint::Joint { joint, .. } => (rig.robot.joints.get(joint).map(|joint| joint.name.clone()), None),
-            Constraint::Limit { limit, .. } => (None, Some(limit)),
-        };
-        let servo::Active { constraint, multiplier, slack } = active;
-        Active { constraint: constraint.words(rig, &[]), joint, limit, multiplier: *multiplier, slack: *slack }
-    }
-}
-
-#[pymethods]
-impl Active {
-    fn __repr__(&self) -> String {
-        let gave_way = if self.slack > 0.0 { format!(", gave way by {:.2e}", self.slack) } else { String::new() };
-        format!("<handeye.servo.Active {}{gave_way}>", self.constraint)
-    }
-}
-
-/// How far a learned rig may be off in what it predicts, from the standard deviations of its numbers: for the margins of limits.
-#[pyclass(module = "handeye.servo", frozen)]
-pub struct PredictionBounds {
-    inner: servo::PredictionBounds,
-    layout: Layout,
-    rig: Arc<rig::Rig>,
-}
-
-#[pymethods]
-impl PredictionBounds {
-    /// rig: one that was learned.
-    #[new]
-    fn new(rig: &Rig) -> PyResult<Self> {
-        let inner = servo::PredictionBounds::new(&rig.inner).map_err(raise)?;
-        Ok(PredictionBounds { inner, layout: Layout::of(&rig.inner), rig: Arc::new(rig.inner.clone()) })
-    }
-
-    /// Bounds of the standard deviations of all predicted pixels of a camera [px], the larger of u and v: shape (n_features,).
-    fn pixels<'py>(&self, py: Python<'py>, joints: Floats<'_>, camera: &str) -> PyResult<NewArray<'py>> {
-        let joints = list("joints", &joints, self.rig.robot.joints.len())?;
-        let camera = self.layout.camera(camera)?;
-        let n = self.rig.features.len();
-        let bounds = (0..n).map(|feature| self.inner.pixel(&joints, camera, feature).unwrap_or(f64::NAN)).collect();
-        Ok(array(py, &[n], bounds))
-    }
-
-    /// Bound of the standard deviation of the tip's position [m], along whichever direction.
-    fn tip(&self, joints: Floats<'_>) -> PyResult<f64> {
-        Ok(self.inner.tip(&list("joints", &joints, self.rig.robot.joints.len())?))
     }
 }
