@@ -10,6 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 use numpy::ndarray::ArrayViewD;
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 /// A least-squares problem with residuals of one's own as Python functions: for prototypes.
@@ -26,6 +27,18 @@ pub struct Graph {
     inner: solvers::Graph,
     nodes: Vec<Handle>,
     raised: Arc<Mutex<Option<PyErr>>>,
+    id: GraphId,
+}
+
+/// What tells graphs apart: of every new one another.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+struct GraphId(u64);
+
+impl Default for GraphId {
+    fn default() -> Self {
+        static NEXT: AtomicU64 = AtomicU64::new(0);
+        GraphId(NEXT.fetch_add(1, Ordering::Relaxed))
+    }
 }
 
 /// A node of a ``Graph``.
@@ -34,6 +47,7 @@ pub struct Graph {
 pub struct Node {
     index: usize,
     kind: Kind,
+    graph: GraphId,
 }
 
 /// What a node is.
@@ -321,19 +335,11 @@ impl Graph {
 impl Graph {
     fn add(&mut self, handle: Handle, kind: Kind) -> Node {
         self.nodes.push(handle);
-        Node { index: self.nodes.len() - 1, kind }
+        Node { index: self.nodes.len() - 1, kind, graph: self.id }
     }
 
     fn handle(&self, node: &Node) -> PyResult<Handle> {
-        let found = self.nodes.get(node.index).copied().filter(|handle| {
-            matches!(
-                (handle, node.kind),
-                (Handle::Vector(_), Kind::Vector(_))
-                    | (Handle::Pose(_), Kind::Pose)
-                    | (Handle::Rotation(_), Kind::Rotation)
-                    | (Handle::Direction(_), Kind::Direction)
-            )
-        });
+        let found = self.nodes.get(node.index).copied().filter(|_| node.graph == self.id);
         found.ok_or_else(|| unusable(format!("{} is of another graph", node.__repr__())))
     }
 

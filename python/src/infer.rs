@@ -95,9 +95,15 @@ impl Inference {
 
     /// Poses of the tip that explain what is seen, most probable first; empty where it leaves the pose open.
     #[pyo3(signature = (pixels, *, points = None))]
-    fn poses(&mut self, pixels: &Bound<'_, PyDict>, points: Option<&Bound<'_, PyDict>>) -> PyResult<Vec<InferredPose>> {
+    fn poses(
+        &mut self,
+        py: Python<'_>,
+        pixels: &Bound<'_, PyDict>,
+        points: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Vec<InferredPose>> {
         let points = self.look(pixels, points)?;
-        let found = self.inner.poses(Sightings { pixels: &self.pixels, points: &points });
+        let (inner, pixels) = (&mut self.inner, &self.pixels);
+        let found = py.detach(|| inner.poses(Sightings { pixels, points: &points }));
         Ok(found.into_iter().map(|inner| InferredPose { inner }).collect())
     }
 }

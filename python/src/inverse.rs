@@ -29,16 +29,21 @@ impl InverseKinematics {
     ///
     /// near: where the search begins, shape (n_joints,).
     #[pyo3(signature = (world_from_tip, near = None))]
-    fn solve(&mut self, world_from_tip: Floats<'_>, near: Option<Floats<'_>>) -> PyResult<Reached> {
+    fn solve(&mut self, py: Python<'_>, world_from_tip: Floats<'_>, near: Option<Floats<'_>>) -> PyResult<Reached> {
         let (pose, near) = self.read(&world_from_tip, near.as_ref())?;
-        Ok(self.inner.solve(&pose, &near).into())
+        Ok(py.detach(|| self.inner.solve(&pose, &near)).into())
     }
 
     /// All branches that reach a pose, nearest to ``near`` first; empty where it is out of reach.
     #[pyo3(signature = (world_from_tip, near = None))]
-    fn branches(&mut self, world_from_tip: Floats<'_>, near: Option<Floats<'_>>) -> PyResult<Vec<Reached>> {
+    fn branches(
+        &mut self,
+        py: Python<'_>,
+        world_from_tip: Floats<'_>,
+        near: Option<Floats<'_>>,
+    ) -> PyResult<Vec<Reached>> {
         let (pose, near) = self.read(&world_from_tip, near.as_ref())?;
-        Ok(self.inner.branches(&pose, &near).into_iter().map(Reached::from).collect())
+        Ok(py.detach(|| self.inner.branches(&pose, &near)).into_iter().map(Reached::from).collect())
     }
 }
 

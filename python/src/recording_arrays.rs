@@ -146,6 +146,16 @@ impl Arrays<'_, '_> {
     }
 
     fn read_targets(&self, recording: &mut Recording) -> PyResult<()> {
+        let known = |camera: &str, target: &str| {
+            self.targets.iter().any(|(one, targets)| one == camera && targets.iter().any(|(one, _)| one == target))
+        };
+        for (camera, covariances) in &self.target_covariances {
+            if let Some((target, _)) = covariances.iter().find(|(target, _)| !known(camera, target)) {
+                return Err(unusable(format!(
+                    "target_covariances: there are no `targets` of camera `{camera}`, `{target}`"
+                )));
+            }
+        }
         for (name, targets) in &self.targets {
             let camera = camera_index(recording, name);
             for (target, array) in targets {

@@ -89,7 +89,7 @@ impl Calibrate {
         let (mut rig, text) = input.map_or_else(|| (Rig::default(), None), |input| (input.rig, Some(input.text)));
         let options = Options { seed: self.seed, estimate_noise: self.estimate_noise, influence: self.influence };
         let bar = Bar::new(is_json);
-        let (trials, folds, calibration, seconds) = on_threads(self.threads, || {
+        let (trials, folds, calibration, suggestion, seconds) = on_threads(self.threads, || {
             let mut trials = Vec::new();
             if self.select_noise {
                 trials = select_noise(&rig, &recording, &options, &mut |progress| bar.show("", progress))?;
@@ -103,15 +103,17 @@ impl Calibrate {
             } else {
                 relearn(&rig, &recording, &self.relearn, &options, &mut show)?
             };
-            Ok((trials, folds, calibration, start.elapsed().as_secs_f64()))
+            let seconds = start.elapsed().as_secs_f64();
+            // Where it cannot be said where to move, as for an arm of which no range is known, the page goes without.
+            let next = SuggestOptions { count: SUGGESTED, ..SuggestOptions::default() };
+            let suggestion =
+                self.report.as_ref().and_then(|_| suggest(&calibration.rig, Some(&recording), Some(&rig), &next).ok());
+            Ok((trials, folds, calibration, suggestion, seconds))
         })?;
         drop(bar);
         let output = self.output.display();
         if let Some(path) = &self.report {
             let tables = folds.iter().map(Folds::as_table).collect::<Vec<_>>();
-            // Where it cannot be said where to move, as for an arm of which no range is known, the page goes without.
-            let next = SuggestOptions { count: SUGGESTED, ..SuggestOptions::default() };
-            let suggestion = suggest(&calibration.rig, Some(&recording), Some(&rig), &next).ok();
             let subject = report::Subject {
                 title: &output.to_string(),
                 before: &rig,

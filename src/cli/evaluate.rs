@@ -75,7 +75,7 @@ fn text(evaluation: &Evaluation) -> String {
     text += &error_table(cameras, total, *rejected).to_string();
     if *rejected > 0 {
         text += &format!(
-            "\n{} left out: the rig does not know the feature, or the sample has no joints\n",
+            "\n{} left out: the rig does not know the camera or feature, or the sample has neither joints nor a tip pose\n",
             count(*rejected, "detection")
         );
     }

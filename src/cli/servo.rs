@@ -79,7 +79,7 @@ impl Servo {
         }
         let world = scene.rig.as_ref().or(known);
         if let (Some(path), Some(world)) = (&self.report, world) {
-            let page = servo_html(&title, world, &run)?;
+            let page = servo_html(&title, world, known.is_some(), &run)?;
             write_output(path, &page)?;
         }
         let nothing = Rig::default();

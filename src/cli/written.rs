@@ -10,10 +10,13 @@ pub fn written(output: &Path, recording: &Recording, notes: &[String]) -> Answer
     let sum = |of: fn(&Sample) -> usize| recording.samples.iter().map(of).sum::<usize>();
     let (detections, targets) = (sum(|sample| sample.pixels.len()), sum(|sample| sample.targets.len()));
     let text = format!(
-        "{}: {} of {}, {} with {}, {}{}\n{}",
+        "{}: {}{}, {} with {}, {}{}\n{}",
         output.display(),
         count(recording.samples.len(), "sample"),
-        count(recording.joints.len(), "joint"),
+        match recording.joints.len() {
+            0 => String::new(),
+            joints => format!(" of {}", count(joints, "joint")),
+        },
         count(recording.cameras.len(), "camera"),
         count(recording.features.len(), "feature"),
         count(detections, "detection"),

@@ -3,4 +3,4 @@ mod motions;
 mod views;
 
 pub(crate) use motions::{Motions, range};
-pub(crate) use views::{Need, Views, pixel_inside, sizes};
+pub(crate) use views::{Need, Views, sizes};

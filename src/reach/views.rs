@@ -1,14 +1,10 @@
 //! What the cameras of a complete rig see of its features.
 use crate::Error;
 use crate::recording::{Detection, PointDetection};
-use crate::rig::{Camera, Model, ModelCamera, Rig};
+use crate::rig::{Camera, Model, Rig};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
 use std::f64::consts::FRAC_PI_4;
-
-/// Cosine of the largest angle by which a pixel's own direction may differ from the feature's: where a distortion has
-/// folded back, a feature outside the image seems to be inside, and the two differ by far more.
-const SAME_DIRECTION: f64 = 1.0 - 1e-9;
 
 /// The cameras, their images, and how much of the features has to be in them.
 pub(crate) struct Views<'a> {
@@ -138,7 +134,7 @@ impl<'a> Views<'a> {
     /// Where a camera sees a feature, if it does.
     fn pixel(&self, camera: usize, feature: usize, links: &[Pose]) -> Option<[f64; 2]> {
         let point = self.model.in_camera(camera, feature, links);
-        let pixel = pixel_inside(&self.model.cameras[camera], self.sizes[camera], &point)?;
+        let pixel = self.model.cameras[camera].pixel_inside(self.sizes[camera], &point)?;
         let shows = |cone: Cone| self.side(camera, feature, links).dot(&cone.axis) >= cone.cosine;
         self.cones[feature].is_none_or(shows).then_some(pixel)
     }
@@ -157,18 +153,6 @@ impl Cone {
         let least = farthest(&axis)?.dot(&axis);
         (least > 0.0).then(|| Cone { axis, cosine: (COUNTED_ON * least.acos()).max(FACING).cos() })
     }
-}
-
-/// Where a camera with images of this size sees a point of its frame, if it does.
-pub(crate) fn pixel_inside(camera: &ModelCamera, [width, height]: [f64; 2], point: &Vector3<f64>) -> Option<[f64; 2]> {
-    let [u, v] = camera.model.project(&camera.intrinsics, point);
-    // The centre of the first pixel is 0, so the image begins half a pixel before it.
-    let is_inside = (-0.5..width - 0.5).contains(&u) && (-0.5..height - 0.5).contains(&v);
-    if !is_inside || !camera.model.is_in_front(point) {
-        return None;
-    }
-    let ray = camera.model.unproject(&camera.intrinsics, [u, v])?;
-    (ray.dot(point) >= SAME_DIRECTION * point.norm()).then_some([u, v])
 }
 
 /// Width and height of every camera's images [px].

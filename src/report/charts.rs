@@ -174,7 +174,9 @@ pub(super) fn curve(curve: &Curve<'_>) -> String {
     for bound in curve.bounds {
         let _ = write!(svg, "<path class=\"expected\" d=\"M{left} {0:.1}H{1}\"/>", y(*bound), left + width);
     }
-    for known in curve.values.split(|(_, value)| !value.is_finite()).filter(|known| !known.is_empty()) {
+    let thinned: Vec<(f64, f64)> =
+        curve.values.iter().copied().step_by(curve.values.len().div_ceil(POINTS).max(1)).collect();
+    for known in thinned.split(|(_, value)| !value.is_finite()).filter(|known| !known.is_empty()) {
         let line = points(known.iter().map(|(time, value)| [x(*time), y(*value)]));
         let _ = write!(svg, "<polyline class=\"line\" stroke-width=\"1.5\" points=\"{line}\"/>");
     }
@@ -187,8 +189,14 @@ pub(super) fn ways(moments: &[Moment], camera: u32, n_features: u32, [width, hei
     let (dot, line) = (width / 130.0, width / 600.0);
     for feature in 0..n_features {
         let is_it = |detection: &&Detection| (detection.camera, detection.feature) == (camera, feature);
-        let way = points(moments.iter().filter_map(|moment| moment.pixels.iter().find(is_it)).map(|seen| seen.pixel));
-        let _ = write!(svg, "<polyline class=\"way\" stroke-width=\"{line:.2}\" points=\"{way}\"/>");
+        let every = moments.len().div_ceil(POINTS).max(1);
+        let seen: Vec<Option<[f64; 2]>> =
+            moments.iter().step_by(every).map(|moment| Some(moment.pixels.iter().find(is_it)?.pixel)).collect();
+        // A way has gaps where its tracker was lost.
+        for way in seen.split(Option::is_none).filter(|way| way.len() > 1) {
+            let way = points(way.iter().flatten().copied());
+            let _ = write!(svg, "<polyline class=\"way\" stroke-width=\"{line:.2}\" points=\"{way}\"/>");
+        }
         if let Some(goal) = moments.last().and_then(|moment| moment.goal.iter().find(is_it)) {
             let [u, v] = goal.pixel;
             let _ = write!(

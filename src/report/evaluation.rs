@@ -1,6 +1,7 @@
 //! The page of an evaluation.
 use super::page::Page;
-use super::{arm, residuals, sections};
+use super::residuals::of_predictions;
+use super::{arm, sections};
 use crate::Error;
 use crate::calibrate::{CameraErrors, Evaluation};
 use crate::recording::Recording;
@@ -18,7 +19,7 @@ pub fn evaluation_html(
     recording: &Recording,
     evaluation: &Evaluation,
 ) -> Result<String, Error> {
-    let residuals = residuals(rig, recording)?;
+    let residuals = of_predictions(rig, recording)?;
     let mut page = Page::new(title);
     summary(&mut page, rig, evaluation);
     sections::cameras(&mut page, rig, &evaluation.cameras, &residuals);
@@ -63,8 +64,13 @@ fn summary(page: &mut Page, rig: &Rig, evaluation: &Evaluation) {
 
 /// What a reader may do.
 fn next(page: &mut Page, rig: &Rig, evaluation: &Evaluation) {
-    let usual = rig.fit.as_ref().map_or(f64::INFINITY, |fit| fit.rms_px);
-    let is_off = |camera: &&CameraErrors| camera.errors.rms_px > WORSE * usual;
+    let fit = rig.fit.as_ref();
+    let usual_px = fit.map(|fit| fit.rms_px).filter(|px| *px > 0.0);
+    let usual_m = fit.and_then(|fit| fit.rms_points_m).filter(|m| *m > 0.0);
+    let exceeds = |found: f64, usual: Option<f64>| usual.is_some_and(|usual| found > WORSE * usual);
+    let is_off = |camera: &&CameraErrors| {
+        exceeds(camera.errors.rms_px, usual_px) || exceeds(camera.errors.points.rms_m, usual_m)
+    };
     let off: Vec<&CameraErrors> = evaluation.cameras.iter().filter(is_off).collect();
     let seeing = evaluation.cameras.iter().filter(|camera| camera.errors.observations > 0).count();
     let mut steps = Vec::new();
@@ -85,7 +91,7 @@ fn next(page: &mut Page, rig: &Rig, evaluation: &Evaluation) {
         steps.extend(off.into_iter().map(words));
     }
     if steps.is_empty() {
-        let words = if usual.is_finite() {
+        let words = if usual_px.or(usual_m).is_some() {
             "It predicts these samples about as well as those that it was learned from: nothing needs to be done."
         } else {
             "The rig does not say what it was learned from; compare the distances with the noise of the detector."

@@ -33,9 +33,19 @@ impl Residual {
 ///
 /// Errors: [`Error::Unusable`] where the rig is not complete or has another number of joints.
 pub fn residuals(rig: &Rig, recording: &Recording) -> Result<Vec<Residual>, Error> {
+    of_states(rig, recording, States::new(rig, recording)?)
+}
+
+/// Those of predictions from states as they were read, as [`crate::calibrate::evaluate()`] has them: nothing is refined by what was seen.
+///
+/// Errors: as [`residuals`].
+pub(super) fn of_predictions(rig: &Rig, recording: &Recording) -> Result<Vec<Residual>, Error> {
+    of_states(rig, recording, States { is_read: true, ..States::new(rig, recording)? })
+}
+
+fn of_states(rig: &Rig, recording: &Recording, mut states: States) -> Result<Vec<Residual>, Error> {
     let model = Model::new(rig)?;
     let index = Correspondence::new(rig, recording);
-    let mut states = States::new(rig, recording)?;
     let mut residuals = Vec::new();
     for (number, sample) in recording.samples.iter().enumerate() {
         let Some(Placed { links, is_tip_alone }) = states.links(&model, sample)? else { continue };
@@ -64,6 +74,8 @@ struct States {
     /// Standard deviations of readings.
     joint_sd: f64,
     is_pose_exact: bool,
+    /// Whether readings are taken as they are, and nothing is inferred.
+    is_read: bool,
 }
 
 impl States {
@@ -80,11 +92,16 @@ impl States {
             tip: TipInference::new(rig)?,
             joint_sd: rig.noise.joints,
             is_pose_exact: !rig.noise.pose.is_noisy(),
+            is_read: false,
         })
     }
 
     /// `None` where nothing determines them.
     fn links(&mut self, model: &Model, sample: &Sample) -> Result<Option<Placed>, Error> {
+        if self.is_read {
+            let joints = sample.joints.as_ref().map(|read| Placed { links: model.links(read), is_tip_alone: false });
+            return Ok(joints.or_else(|| sample.pose.map(|pose| Placed::by_tip(model, pose))));
+        }
         let (pixels, points) = (self.names.sightings(sample), self.names.points(sample));
         let seen = Sightings { pixels: &pixels, points: &points };
         if let (Some(inference), Some(read)) = (&mut self.joints, &sample.joints) {

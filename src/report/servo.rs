@@ -14,11 +14,11 @@ use std::collections::BTreeMap;
 /// Rows of the table of steps at most.
 const ROWS: usize = 24;
 
-/// The page of a run in simulation, with the loop as an animation. `rig`: that of the world, by which the arm is drawn; `title` stands at
-/// the top.
+/// The page of a run in simulation, with the loop as an animation. `rig`: that of the world, by which the arm is drawn; `has_rig`: whether the
+/// controller knew one; `title` stands at the top.
 ///
 /// Errors: [`Error::Unusable`] where the rig is not complete.
-pub fn servo_html(title: &str, rig: &Rig, run: &Run) -> Result<String, Error> {
+pub fn servo_html(title: &str, rig: &Rig, has_rig: bool, run: &Run) -> Result<String, Error> {
     let mut page = Page::new(title);
     summary(&mut page, rig, run);
     let stride = thinned(run.moments.len());
@@ -30,15 +30,14 @@ pub fn servo_html(title: &str, rig: &Rig, run: &Run) -> Result<String, Error> {
     joint_curves(&mut page, rig, run);
     held_back(&mut page, rig, run);
     steps(&mut page, run);
-    next(&mut page, run);
+    next(&mut page, run, has_rig);
     Ok(page.finish())
 }
 
 fn summary(page: &mut Page, rig: &Rig, run: &Run) {
     page.section("summary", "How it ended");
     let last = run.moments.last();
-    let px =
-        last.and_then(|moment| moment.error_px).map(|px| (format!("{px:.3} px"), "mean pixel distance at the end"));
+    let px = last.and_then(|moment| moment.error_px).map(|px| (format!("{px:.3} px"), "error in pixels at the end"));
     let space =
         last.map(|moment| (format!("{:.3} mm", 1e3 * moment.error_m), "distance in space at the end, in truth"));
     let seconds = last.map(|moment| (format!("{:.2} s", moment.time), "until it stopped"));
@@ -92,7 +91,7 @@ fn errors(page: &mut Page, run: &Run) {
     let space: Vec<(f64, f64)> = run.moments.iter().map(|moment| (moment.time, 1e3 * moment.error_m)).collect();
     page.section("errors", "How the error fell");
     page.begin_row();
-    let both = [("mean pixel distance [px]", &pixels), ("distance in space, in truth [mm]", &space)];
+    let both = [("error [px]", &pixels), ("distance in space, in truth [mm]", &space)];
     for (words, values) in both {
         let drawing = curve(&Curve { words, values, is_logarithmic: true, bounds: &[] });
         page.drawing(&drawing, &format!("{words} against time"));
@@ -172,24 +171,32 @@ fn steps(page: &mut Page, run: &Run) {
 }
 
 /// What a reader may do.
-fn next(page: &mut Page, run: &Run) {
+fn next(page: &mut Page, run: &Run, has_rig: bool) {
     let words = match &run.stop {
-        Stop::Converged { .. } => "It arrived: nothing needs to be done.",
+        Stop::Converged { .. } => "It arrived: nothing needs to be done.".to_owned(),
         Stop::NoBetter { .. } => {
-            "Where the error left is of the size by which it varies, only less noise brings it nearer. Where it is much larger, what is aimed at \
-             cannot be reached exactly: the rig is off (handeye evaluate tells by how much), or a tracker or the target is."
+            let who = if has_rig { "the rig is off (handeye evaluate tells by how much), or " } else { "" };
+            format!(
+                "Where the error left is of the size by which it varies, only less noise brings it nearer. Where it is much larger, what is \
+                 aimed at cannot be reached exactly: {who}a tracker or the target is off."
+            )
         }
-        Stop::Blocked { .. } => "Loosen the limits that are named, or begin or end elsewhere.",
-        Stop::Diverged { .. } => {
+        Stop::Blocked { .. } => "Loosen the limits that are named, or begin or end elsewhere.".to_owned(),
+        Stop::Diverged { .. } if has_rig => {
             "The controller is wrong about how the pixels move: handeye evaluate and handeye monitor tell whether the rig still describes \
              this robot; a smaller gain helps where it is only roughly right."
+                .to_owned()
         }
-        Stop::Undetermined { .. } => "More features, or a camera that sees them from elsewhere, determine the motion.",
-        Stop::Lost { .. } => {
-            "Keep the features in view: a limit of kind in-image does, and so does a start nearer to the target."
+        Stop::Diverged { .. } => {
+            "What was explored does not hold on the way: a smaller gain, a start nearer to the target or cameras at a wider angle help.".to_owned()
         }
-        Stop::TimedOut { .. } => "Give the loop more time or the arm more speed, where the error was still falling.",
+        Stop::Undetermined { .. } => "More features, or a camera that sees them from elsewhere, determine the motion.".to_owned(),
+        Stop::Lost { why, .. } => {
+            let limit = if has_rig { ", or the limit in_image where they leave the images" } else { "" };
+            format!("Mend what was missing at last ({why}); a start nearer to the target{limit} may keep features in view.")
+        }
+        Stop::TimedOut { .. } => "Give the loop more time or the arm more speed, where the error was still falling.".to_owned(),
     };
     page.section("next", "What to do next");
-    page.paragraph(words);
+    page.paragraph(&words);
 }

@@ -43,7 +43,24 @@ pub struct ModelFeature {
     pub xyz: Vector3<f64>,
 }
 
+/// Cosine of the largest angle by which a pixel's own direction may differ from the feature's: where a distortion has
+/// folded back, a feature outside the image seems to be inside, and the two differ by far more.
+const SAME_DIRECTION: f64 = 1.0 - 1e-9;
+
 impl ModelCamera {
+    /// Where it sees a point of its frame [m] in images of this width and height [px]; `None` where it does not.
+    pub fn pixel_inside(&self, [width, height]: [f64; 2], point: &Vector3<f64>) -> Option<[f64; 2]> {
+        let [u, v] = self.model.project(&self.intrinsics, point);
+        // The centre of the first pixel is 0, so the image begins half a pixel before it.
+        let is_inside = (-0.5..width - 0.5).contains(&u) && (-0.5..height - 0.5).contains(&v);
+        if !is_inside || !self.model.is_in_front(point) {
+            return None;
+        }
+        // What a distortion folds back into the image is seen elsewhere.
+        let ray = self.model.unproject(&self.intrinsics, [u, v])?;
+        (ray.dot(point) >= SAME_DIRECTION * point.norm()).then_some([u, v])
+    }
+
     /// True where it has a lens, so that it gives pixels; false for a depth camera that gives points alone.
     pub fn has_lens(&self) -> bool {
         self.intrinsics[0] != 0.0

@@ -20,6 +20,7 @@ mod motion_solver;
 mod pixel_reader;
 mod pose_based;
 mod prediction_bounds;
+mod readings;
 mod rig_foresight;
 mod rows;
 mod servo_loop;

@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 /// When a loop moves, and when it stops. Everything may change between ticks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoopSettings {
-    /// Mean pixel distance below which the features are where they shall be [px].
+    /// Error below which the features are where they shall be [px]: see [`Stop`].
     pub tolerance_px: f64,
     /// Measurements in a row that have to be within the tolerance.
     pub settled: usize,
@@ -55,7 +55,7 @@ impl Default for LoopSettings {
 pub struct Tick {
     /// What the robot shall do; [`Command::Hold`] where the loop waits or stops.
     pub command: Command,
-    /// Mean distance of the features from where they shall be [px]; `None` where none of them is seen.
+    /// The error that the controller judges [px], see [`Stop`]; `None` where nothing is seen of what is aimed at.
     pub error_px: Option<f64>,
     /// What holds the motion back.
     pub active: Vec<Active>,
@@ -179,7 +179,7 @@ impl<C: Controller> ServoLoop<C> {
             return Ok(self.hold(error_px, Some("what was measured is from before the last motion ended".to_owned())));
         }
         let Some(error) = error_px else {
-            return Ok(self.wait(now, None, "none of the features of the goal is seen".to_owned()));
+            return Ok(self.wait(now, None, "nothing is seen of what is aimed at".to_owned()));
         };
         // A measurement that is seen twice tells nothing the second time.
         let is_new = measurement.time > self.judged;

@@ -2,24 +2,25 @@
 use super::{Active, Bound, Constraint};
 use crate::rig::Rig;
 
-/// Why a loop moves no more.
+/// Why a loop moves no more. Errors in pixels are those that its controller judges: the mean distance of the features from where they shall be,
+/// or of a task in images the root of the mean square of its rows.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Stop {
     /// The features are where they shall be.
     Converged {
-        /// Mean pixel distance that is left [px].
+        /// Error that is left [px].
         error_px: f64,
     },
     /// The error falls no more, although nothing holds the arm back: noise keeps it where it is.
     NoBetter {
-        /// Mean pixel distance over the last measurements [px].
+        /// Error over the last measurements [px].
         error_px: f64,
         /// Its standard deviation from one measurement to the next [px].
         sd_px: f64,
     },
     /// Limits leave no motion that helps.
     Blocked {
-        /// Mean pixel distance that is left [px].
+        /// Error that is left [px].
         error_px: f64,
         /// The limits.
         by: Vec<Active>,
@@ -28,9 +29,9 @@ pub enum Stop {
     },
     /// The error grew beyond any use.
     Diverged {
-        /// Mean pixel distance when the loop began [px].
+        /// Error from which it grew [px].
         from_px: f64,
-        /// Mean pixel distance now [px].
+        /// Error now [px].
         error_px: f64,
     },
     /// What is seen does not determine how to move.
@@ -47,7 +48,7 @@ pub enum Stop {
     },
     /// The time is up.
     TimedOut {
-        /// Mean pixel distance that is left [px], if it is known.
+        /// Error that is left [px], if it is known.
         error_px: Option<f64>,
         /// How much time there was [s].
         seconds: f64,

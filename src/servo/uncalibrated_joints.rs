@@ -1,7 +1,8 @@
 //! Servoing joints to pixels without a rig, or with one that may be outdated.
+use super::readings::Readings;
 use super::rig_foresight::RigForesight;
 use super::tracker_watch::TrackerWatch;
-use super::uncalibrated::{Phase, Quantity, Row, Settings, Uncalibrated, not_read, stop_of};
+use super::uncalibrated::{Phase, Quantity, Row, Settings, Uncalibrated, for_rows, stop_of};
 use super::{Arm, Configuration, Controller, Decision, Limit, LimitRows, Measurement, Takes};
 use crate::Error;
 use crate::infer::Sighting;
@@ -19,7 +20,7 @@ use std::collections::BTreeSet;
 pub struct UncalibratedJoints {
     /// What the robot takes: joints, joint motions or joint speeds.
     pub takes: Takes,
-    quantities: Vec<Quantity>,
+    readings: Readings,
     sd_px: f64,
     settings: Settings,
     /// The rig that is given, and its arm.
@@ -32,15 +33,9 @@ pub struct UncalibratedJoints {
     servo: Option<Uncalibrated>,
     watch: TrackerWatch,
     errors: Vec<f64>,
-    /// Where the joints are, as read or as commanded so far [rad or m].
-    joints: Vec<f64>,
-    commanded: Vec<f64>,
-    /// Whether joints were read when servoing began.
-    is_read: bool,
+    /// Mean distance of the features that are believed, at the last decision [px].
+    error_px: f64,
 }
-
-/// Rows of the thesis's tasks, to which [`Settings::divergence`] refers here.
-const ROWS: f64 = 12.0;
 
 impl UncalibratedJoints {
     /// Of joints of which the limits are known, as far as there are any. `sd_px`: standard deviation of a tracker's pixel coordinates [px].
@@ -52,10 +47,9 @@ impl UncalibratedJoints {
         // What is wrong is told at once and not at the first step.
         let rows = vec![Row { sd: sd_px, camera: 0 }; quantities.len()];
         Uncalibrated::new(quantities.clone(), rows, settings.clone())?;
-        let n = quantities.len();
         Ok(UncalibratedJoints {
             takes: Takes::default(),
-            quantities,
+            readings: Readings::new(quantities),
             sd_px,
             settings,
             rig: None,
@@ -66,9 +60,7 @@ impl UncalibratedJoints {
             servo: None,
             watch: TrackerWatch::default(),
             errors: Vec::new(),
-            joints: Vec::new(),
-            commanded: vec![0.0; n],
-            is_read: false,
+            error_px: f64::NAN,
         })
     }
 
@@ -85,11 +77,11 @@ impl UncalibratedJoints {
     ///
     /// Errors: [`Error::Unusable`] where they are not as many as the joints, or less than 0.
     pub fn dead_bands(&mut self, widths: &[f64]) -> Result<(), Error> {
-        if widths.len() != self.quantities.len() || widths.iter().any(|width| !(*width >= 0.0 && width.is_finite())) {
-            let n = self.quantities.len();
+        if widths.len() != self.readings.len() || widths.iter().any(|width| !(*width >= 0.0 && width.is_finite())) {
+            let n = self.readings.len();
             return Err(Error::Unusable(format!("dead bands are {n} numbers of 0 or more, found {widths:?}")));
         }
-        self.quantities.iter_mut().zip(widths).for_each(|(quantity, width)| quantity.dead_band = *width);
+        self.readings.set_dead_bands(widths.iter().copied());
         self.servo = None;
         Ok(())
     }
@@ -105,9 +97,9 @@ impl UncalibratedJoints {
     }
 
     /// Begins with the features of the goal that are seen.
-    fn begin(&mut self, seen: &[Sighting], is_read: bool) -> Result<(), Error> {
+    fn begin(&mut self, seen: &[Sighting]) -> Result<(), Error> {
         self.rows = self.goal.iter().filter(|goal| find(seen, goal).is_some()).copied().collect();
-        let (n, m) = (self.quantities.len(), 2 * self.rows.len());
+        let (n, m) = (self.readings.len(), 2 * self.rows.len());
         if m < n {
             let [seen, all] = [self.rows.len(), self.goal.len()];
             return Err(Error::NotEnoughData(format!(
@@ -116,16 +108,7 @@ impl UncalibratedJoints {
         }
         let row = |goal: &Sighting| [Row { sd: self.sd_px, camera: goal.camera }; 2];
         let rows: Vec<Row> = self.rows.iter().flat_map(row).collect();
-        // The divergence of the thesis is one of 12 rows.
-        let divergence = self.settings.divergence * f64::max(1.0, m as f64 / ROWS);
-        let settings = Settings { divergence, ..self.settings.clone() };
-        let mut quantities = self.quantities.clone();
-        if !is_read {
-            // Nobody knows how far it is to the ends of joints that are not read; the robot stops at them.
-            quantities.iter_mut().for_each(|one| (one.limits.lower, one.limits.upper) = (None, None));
-        }
-        self.is_read = is_read;
-        let mut servo = Uncalibrated::new(quantities, rows, settings)?;
+        let mut servo = Uncalibrated::new(self.readings.quantities(), rows, for_rows(&self.settings, m))?;
         if let Some((rig, _)) = &self.rig {
             servo.begin_with_model(Box::new(RigForesight::new(rig, &self.rows)?));
         }
@@ -136,7 +119,7 @@ impl UncalibratedJoints {
 
     /// The rows of the limits, which need a rig.
     fn limit(&mut self, limits: &[&dyn Limit], dt: f64) -> Result<(), Error> {
-        self.limits.clear(self.quantities.len());
+        self.limits.clear(self.readings.len());
         let Some((_, arm)) = &self.rig else {
             return if limits.is_empty() {
                 Ok(())
@@ -144,7 +127,7 @@ impl UncalibratedJoints {
                 Err(Error::Unusable("limits beside those of the joints need a rig, and none is given".to_owned()))
             };
         };
-        arm.configure(&self.joints, &mut self.at);
+        arm.configure(self.readings.now(), &mut self.at);
         for (index, limit) in limits.iter().enumerate() {
             self.limits.begin(index);
             limit.rows(arm, &self.at, dt, &mut self.limits);
@@ -153,16 +136,13 @@ impl UncalibratedJoints {
     }
 
     fn command(&self, motion: &[f64], dt: f64) -> Result<Command, Error> {
-        match self.takes {
-            Takes::Joints => Ok(Command::Joints(self.joints.iter().zip(motion).map(|(at, by)| at + by).collect())),
-            Takes::JointDelta => Ok(Command::JointDelta(motion.to_vec())),
-            Takes::JointVelocity => Ok(Command::JointVelocity(motion.iter().map(|motion| motion / dt).collect())),
-            Takes::PoseDelta | Takes::PoseVelocity => Err(Error::Unusable(format!(
+        self.readings.command(self.takes, motion, dt).ok_or_else(|| {
+            Error::Unusable(format!(
                 "without a rig that is right, a joint motion cannot be told to a robot that takes {}: it needs joints, joint-deltas or \
                  joint-velocities",
                 self.takes.name()
-            ))),
-        }
+            ))
+        })
     }
 }
 
@@ -195,17 +175,14 @@ impl Controller for UncalibratedJoints {
     }
 
     fn decide(&mut self, now: &Measurement<'_>, limits: &[&dyn Limit], dt: f64) -> Result<Decision, Error> {
-        let is_read = !now.joints.is_empty();
-        // A sum of motions stands for readings of a robot that reads nothing: it is where no joint is, and takes the place of none.
-        if !is_read && (self.is_read || self.takes == Takes::Joints || self.rig.is_some()) {
-            return Err(not_read());
+        let must_read = self.takes == Takes::Joints || self.rig.is_some();
+        if self.readings.take(now.joints, must_read)? {
+            self.servo = None;
         }
-        self.joints.clear();
-        self.joints.extend(if is_read { now.joints } else { &self.commanded });
         if self.servo.is_none() {
-            self.begin(now.seen, is_read)?;
+            self.begin(now.seen)?;
         }
-        if self.joints.iter().all(|joint| joint.is_finite()) && self.joints.len() == self.quantities.len() {
+        if self.readings.now().len() == self.readings.len() {
             self.limit(limits, dt)?;
         }
         let rows = &self.rows;
@@ -215,8 +192,9 @@ impl Controller for UncalibratedJoints {
             None => [f64::NAN; 2],
         }));
         let Some(servo) = &mut self.servo else { return Ok(Decision::free(Command::Hold)) };
-        self.watch.judge(servo.estimate(), &self.joints, &mut self.errors);
-        let told = servo.step(&self.joints, &self.errors, &self.limits, dt)?;
+        let joints = self.readings.now();
+        self.watch.judge(servo.estimate(), joints, &mut self.errors);
+        let told = servo.step(joints, &self.errors, &self.limits, dt)?;
         let (phase, motion) = (told.phase.clone(), told.motion.to_vec());
         let (active, conflict) = (told.active.to_vec(), told.conflict.to_vec());
         // A tracker goes with either of its rows.
@@ -224,12 +202,13 @@ impl Controller for UncalibratedJoints {
             self.watch.give_up(tracker);
             (2 * tracker..2 * tracker + 2).for_each(|row| servo.give_up(row));
         }
-        self.watch.moves_from(&self.joints);
+        self.watch.moves_from(joints);
         let mut sizes: Vec<f64> = self.errors.chunks(2).map(|error| error[0].hypot(error[1])).collect();
         sizes.retain(|size| size.is_finite());
-        let stop = stop_of(&phase, sizes.iter().sum::<f64>() / sizes.len().max(1) as f64, sizes.len())?;
+        let error_px = sizes.iter().sum::<f64>() / sizes.len() as f64;
+        let stop = stop_of(&phase, std::mem::replace(&mut self.error_px, error_px), error_px)?;
         let explores = self.phase() == Some(&Phase::Exploring);
-        self.commanded.iter_mut().zip(&motion).for_each(|(at, by)| *at += by);
+        self.readings.moves(&motion);
         let command = if stop.is_some() { Command::Hold } else { self.command(&motion, dt)? };
         Ok(Decision { command, active, conflict, left_out: self.left_out().collect(), explores, stop })
     }

@@ -1,7 +1,8 @@
 //! Carrying out a task in images without a rig.
 use super::image_tasks::{ImageTask, Place, Seen};
+use super::readings::Readings;
 use super::target_watch::TargetWatch;
-use super::uncalibrated::{Phase, Quantity, Row, Settings, Uncalibrated, not_read, stop_of};
+use super::uncalibrated::{Phase, Quantity, Row, Settings, Uncalibrated, for_rows, stop_of};
 use super::{Controller, Decision, Limit, LimitRows, Measurement, Takes};
 use crate::Error;
 use crate::infer::Sighting;
@@ -21,23 +22,18 @@ pub struct UncalibratedTask {
     pub carried: Vec<bool>,
     takes: Takes,
     task: ImageTask,
-    quantities: Vec<Quantity>,
+    readings: Readings,
     settings: Settings,
     servo: Option<Uncalibrated>,
     limits: LimitRows,
     target: Option<TargetWatch>,
-    /// Whether the robot gave readings when the servoing began.
-    is_read: bool,
-    readings: Vec<f64>,
-    commanded: Vec<f64>,
     errors: Vec<f64>,
+    /// Root of the mean square of the rows, at the last decision [px].
+    error_px: f64,
 }
 
 /// What the tip moves by for every unit of a controlled coordinate [m]: motions of joints and of the tip are then alike in size.
 const REACH: f64 = 0.2;
-
-/// Rows of the thesis's tasks, to which [`Settings::divergence`] refers here.
-const ROWS: f64 = 12.0;
 
 impl UncalibratedTask {
     /// For a robot that takes this, with joints of which the limits are known as far as there are any.
@@ -55,7 +51,6 @@ impl UncalibratedTask {
                 .map(|joint| Quantity { name: joint.name.clone(), limits: joint.limits, dead_band: 0.0 })
                 .collect(),
         };
-        let n = quantities.len();
         // What is wrong is told at once and not at the first step.
         let rows = vec![Row { sd: task.trackers().pixels, camera: 0 }; task.rows()];
         Uncalibrated::new(quantities.clone(), rows, settings.clone())?;
@@ -63,15 +58,13 @@ impl UncalibratedTask {
             carried: vec![false; task.cameras().len()],
             takes,
             task,
-            quantities,
+            readings: Readings::new(quantities),
             settings,
             servo: None,
             limits: LimitRows::default(),
             target: None,
-            is_read: false,
-            readings: vec![0.0; n],
-            commanded: vec![0.0; n],
             errors: Vec::new(),
+            error_px: f64::NAN,
         })
     }
 
@@ -82,7 +75,7 @@ impl UncalibratedTask {
         if !(width >= 0.0 && width.is_finite()) {
             return Err(Error::Unusable(format!("a dead band is 0 or more, found {width}")));
         }
-        self.quantities.iter_mut().for_each(|quantity| quantity.dead_band = width);
+        self.readings.set_dead_bands(std::iter::repeat(width));
         (self.servo, self.target) = (None, None);
         Ok(())
     }
@@ -113,9 +106,9 @@ impl UncalibratedTask {
     fn command(&self, motion: &[f64], dt: f64) -> Command {
         let shift = |m: &[f64]| REACH * Vector3::new(m[0], m[1], m[2]);
         match self.takes {
-            Takes::Joints => Command::Joints(self.readings.iter().zip(motion).map(|(at, by)| at + by).collect()),
-            Takes::JointDelta => Command::JointDelta(motion.to_vec()),
-            Takes::JointVelocity => Command::JointVelocity(motion.iter().map(|motion| motion / dt).collect()),
+            Takes::Joints | Takes::JointDelta | Takes::JointVelocity => {
+                self.readings.command(self.takes, motion, dt).unwrap_or(Command::Hold)
+            }
             Takes::PoseDelta => Command::PoseDelta(Pose { rotation: Matrix3::identity(), translation: shift(motion) }),
             Takes::PoseVelocity => {
                 let (w, v) = (Vector3::new(motion[0], motion[1], motion[2]) / dt, shift(&motion[3..]) / dt);
@@ -131,10 +124,7 @@ impl Controller for UncalibratedTask {
 
     /// Root of the mean square of the rows that are seen.
     fn error_px(&self, now: &Measurement<'_>, _: &[Sighting], _: &[(usize, usize)]) -> Option<f64> {
-        let mut squares = self.task.values(&self.see(now));
-        squares.retain(|error| error.is_finite());
-        squares.iter_mut().for_each(|error| *error *= *error);
-        (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+        root_mean_square(&self.task.values(&self.see(now)))
     }
 
     fn decide(&mut self, now: &Measurement<'_>, limits: &[&dyn Limit], dt: f64) -> Result<Decision, Error> {
@@ -142,27 +132,17 @@ impl Controller for UncalibratedTask {
             return Err(Error::Unusable("limits beside those of the joints need a rig, and none is given".to_owned()));
         }
         let moves_joints = !matches!(self.takes, Takes::PoseDelta | Takes::PoseVelocity);
-        let is_read = moves_joints && !now.joints.is_empty();
-        if !is_read && (self.is_read || self.takes == Takes::Joints) {
-            return Err(not_read());
+        let read = if moves_joints { now.joints } else { &[] };
+        if self.readings.take(read, self.takes == Takes::Joints)? {
+            (self.servo, self.target) = (None, None);
         }
-        self.readings.clear();
-        self.readings.extend(if is_read { now.joints } else { &self.commanded });
         let seen = self.see(now);
         let servo = match &mut self.servo {
             Some(servo) => servo,
             none => {
                 let rows = self.task.signals(&seen)?;
-                // The divergence of the thesis is one of 12 rows.
-                let divergence = self.settings.divergence * f64::max(1.0, rows.len() as f64 / ROWS);
-                let settings = Settings { divergence, ..self.settings.clone() };
-                self.is_read = is_read;
-                let mut quantities = self.quantities.clone();
-                if !is_read {
-                    // Nobody knows how far it is to the ends of joints that are not read; the robot stops at them.
-                    quantities.iter_mut().for_each(|one| (one.limits.lower, one.limits.upper) = (None, None));
-                }
-                none.insert(Uncalibrated::new(quantities, rows, settings)?)
+                let settings = for_rows(&self.settings, rows.len());
+                none.insert(Uncalibrated::new(self.readings.quantities(), rows, settings)?)
             }
         };
         let target = self.target.get_or_insert_with(|| TargetWatch::new(&seen));
@@ -170,16 +150,22 @@ impl Controller for UncalibratedTask {
             servo.shift(&changes)?;
         }
         self.errors = self.task.values(&seen);
-        self.limits.clear(self.quantities.len());
-        let told = servo.step(&self.readings, &self.errors, &self.limits, dt)?;
+        self.limits.clear(self.readings.len());
+        let told = servo.step(self.readings.now(), &self.errors, &self.limits, dt)?;
         let (phase, motion) = (told.phase.clone(), told.motion.to_vec());
         let (active, conflict) = (told.active.to_vec(), told.conflict.to_vec());
-        let mut seen: Vec<f64> = self.errors.iter().map(|error| error.abs()).collect();
-        seen.retain(|error| error.is_finite());
-        let stop = stop_of(&phase, seen.iter().sum::<f64>() / seen.len().max(1) as f64, seen.len())?;
-        self.commanded.iter_mut().zip(&motion).for_each(|(at, by)| *at += by);
+        let error_px = root_mean_square(&self.errors).unwrap_or(f64::NAN);
+        let stop = stop_of(&phase, std::mem::replace(&mut self.error_px, error_px), error_px)?;
+        self.readings.moves(&motion);
         let command = if stop.is_some() { Command::Hold } else { self.command(&motion, dt) };
         let explores = phase == Phase::Exploring;
         Ok(Decision { active, conflict, explores, stop, ..Decision::free(command) })
     }
+}
+
+/// Of the errors that are numbers; `None` where none is.
+fn root_mean_square(errors: &[f64]) -> Option<f64> {
+    let (sum, n) =
+        errors.iter().filter(|error| error.is_finite()).fold((0.0, 0.0_f64), |(sum, n), e| (sum + e * e, n + 1.0));
+    (n > 0.0).then(|| (sum / n).sqrt())
 }

@@ -16,15 +16,16 @@ addEventListener('load', () => {
   const places = slider && [slider.min, slider.max].map((value) => {
     slider.value = value;
     slider.dispatchEvent(new Event('input'));
-    return [dot.getAttribute('cx'), document.getElementById('now').textContent].join();
+    return [dot.getAttribute('cx'), document.getElementById('now').textContent, canvas.toDataURL()];
   });
+  if (slider) document.getElementById('play').click();
   document.title = JSON.stringify({
     errors: window.failures,
     overflows: root.scrollWidth > root.clientWidth + 1 || wide.length > 0,
     drawings: document.querySelectorAll('svg').length,
     empty: empty.length,
     drawn: pixels.some((value) => value > 0),
-    plays: places && places[0] !== places[1],
+    plays: places && places[0].every((place, index) => place !== places[1][index]) && document.getElementById('play').textContent === 'pause',
     ink: getComputedStyle(document.body).color,
   });
 });
@@ -81,8 +82,9 @@ impl Pages {
         assert!(output.status.success(), "{arguments}: {}", String::from_utf8_lossy(&output.stderr));
     }
 
-    /// That page.html is whole on screen and phone, in light and dark, with at least so many drawings, none of them empty.
-    fn are_whole(&self, drawings: u64) {
+    /// That page.html is whole on screen and phone, in light and dark, with at least so many drawings, none of them empty; and that its player
+    /// moves features and arm, where there is one.
+    fn are_whole(&self, drawings: u64, plays: Option<bool>) {
         let page = std::fs::read_to_string(self.folder.join("page.html")).unwrap();
         let page =
             page.replacen("<head>", &format!("<head>{LISTEN}"), 1).replacen("</body>", &format!("{CHECK}</body>"), 1);
@@ -99,8 +101,7 @@ impl Pages {
             );
             assert!(answer["drawings"].as_u64().unwrap() >= drawings && answer["empty"] == 0, "{answer}");
             inks.push(answer["ink"].clone());
-            // What can be played moves.
-            assert!(answer["plays"].is_null() || answer["plays"] == true, "{answer}");
+            assert_eq!(answer["plays"], serde_json::json!(plays), "{answer}");
         }
         assert!(inks[0] == inks[1] && inks[0] != inks[2], "dark pages have another ink: {inks:?}");
     }
@@ -118,9 +119,9 @@ fn pages_of_calibrations_and_evaluations_are_whole_on_screen_and_phone_in_light_
     pages.run("simulate ur5 --samples 40 --outliers 0.02 -o motions.jsonl");
     pages.run("calibrate motions.jsonl -o learned.toml --report page.html --influence");
     // A scatter and a map of each camera, a histogram, the joints, and at least four images of bad samples.
-    pages.are_whole(10);
+    pages.are_whole(10, None);
     pages.run("evaluate learned.toml motions.jsonl --report page.html");
-    pages.are_whole(10);
+    pages.are_whole(10, None);
 }
 
 #[test]
@@ -128,5 +129,5 @@ fn pages_of_servo_runs_are_whole_and_play() {
     let Some(pages) = Pages::new("servo") else { return };
     pages.run("servo ur5 ur5-reach --report page.html");
     // An image of each camera, two errors, six joints.
-    pages.are_whole(10);
+    pages.are_whole(10, Some(true));
 }

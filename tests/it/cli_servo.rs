@@ -128,8 +128,8 @@ fn a_loop_that_ends_badly_has_status_1_and_its_reason() {
     let folder = Folder::new("servo-bad-end");
     folder.write("lost.toml", &format!("{SCENE}[tracker]\nmissed = 1.0\n"));
     let (text, complaint) = folder.expect(1, "servo ur5 lost.toml");
-    assert!(complaint.contains("lost for 5.000 s: none of the features of the goal is seen"), "{complaint}");
-    assert!(text.contains("waits: none of the features"), "{text}");
+    assert!(complaint.contains("lost for 5.000 s: nothing is seen of what is aimed at"), "{complaint}");
+    assert!(text.contains("waits: nothing is seen of what is aimed at"), "{text}");
     let slow = SCENE.replace("[target]", "latency = 0.8\n[target]");
     folder.write("stale.toml", &slow);
     let (_, complaint) = folder.expect(1, "servo ur5 stale.toml");

@@ -184,6 +184,23 @@ fn an_evaluation_has_a_page_that_names_the_camera_that_was_moved() {
 }
 
 #[test]
+fn an_evaluation_page_shows_predictions_from_the_readings_however_noisy_they_are() {
+    let folder = Folder::new("report-noisy-evaluation");
+    let (_, ur5) = catalog::ALL.iter().find(|(name, _)| *name == "ur5").unwrap();
+    let noisy = ur5.replace("[noise]", "[noise]\njoints = 0.01");
+    assert_ne!(noisy, *ur5);
+    folder.write("noisy.toml", &noisy);
+    folder.expect(0, "simulate noisy.toml --samples 30 --seed 2 -o fresh.jsonl");
+    let (json, _) = folder.expect(0, "evaluate noisy.toml fresh.jsonl --report page.html --json");
+    let json: Value = serde_json::from_str(&json).unwrap();
+    let medians = json["sample_median_px"].as_array().unwrap().iter().filter_map(Value::as_f64);
+    let worst = medians.fold(0.0, f64::max);
+    // Noise of 0.01 rad is many pixels, of which refined readings would leave nothing.
+    assert!(worst > 3.0, "{worst}");
+    assert!(folder.read("page.html").contains(&format!("<td>{worst:.3}</td>")), "{worst}");
+}
+
+#[test]
 fn a_servo_run_has_a_page_that_plays_what_the_cameras_saw() {
     let folder = Folder::new("report-servo");
     let (json, _) = folder.expect(0, "servo ur5 ur5-reach --report page.html --json");

@@ -244,8 +244,8 @@ fn nothing_moves_on_useless_measurements_and_the_loop_is_lost_in_the_end() {
         (&seen, |now| now - 0.6, "0.600 s old"),
         (&seen, |_| 0.0, "s old"),
         (&seen, |_| f64::NAN, "NaN s old"),
-        (&spoilt, |now| now, "none of the features of the goal is seen"),
-        (&[], |now| now, "none of the features of the goal is seen"),
+        (&spoilt, |now| now, "nothing is seen of what is aimed at"),
+        (&[], |now| now, "nothing is seen of what is aimed at"),
     ];
     for (seen, dated, why) in cases {
         let mut servo = ServoLoop::new(Restless, settings());

@@ -1,6 +1,7 @@
 //! Limits of the joints, one array each.
 use super::Rig;
 use crate::arrays::{Floats, NewArray, array, list};
+use crate::errors::unusable;
 use handeye::rig::Limits;
 use pyo3::prelude::*;
 
@@ -13,12 +14,13 @@ impl Rig {
         &mut self,
         what: &str,
         values: &Floats<'_>,
+        unlimited: f64,
         of: impl Fn(&mut Limits) -> &mut Option<f64>,
     ) -> PyResult<()> {
-        let values = list(what, values, self.inner.robot.joints.len())?;
+        let values = bounds(what, values, self.inner.robot.joints.len(), unlimited)?;
         self.change(|rig| {
             for (joint, value) in rig.robot.joints.iter_mut().zip(&values) {
-                *of(&mut joint.limits) = value.is_finite().then_some(*value);
+                *of(&mut joint.limits) = *value;
             }
         })
     }
@@ -34,7 +36,7 @@ impl Rig {
 
     #[setter]
     fn set_lower(&mut self, values: Floats<'_>) -> PyResult<()> {
-        self.set_limit("lower", &values, |limits| &mut limits.lower)
+        self.set_limit("lower", &values, f64::NEG_INFINITY, |limits| &mut limits.lower)
     }
 
     /// Largest reading of every joint [rad or m], inf where unlimited; shape (n_joints,).
@@ -45,7 +47,7 @@ impl Rig {
 
     #[setter]
     fn set_upper(&mut self, values: Floats<'_>) -> PyResult<()> {
-        self.set_limit("upper", &values, |limits| &mut limits.upper)
+        self.set_limit("upper", &values, f64::INFINITY, |limits| &mut limits.upper)
     }
 
     /// Largest speed of every joint [rad/s or m/s], inf where unlimited; shape (n_joints,).
@@ -56,7 +58,7 @@ impl Rig {
 
     #[setter]
     fn set_max_velocity(&mut self, values: Floats<'_>) -> PyResult<()> {
-        self.set_limit("max_velocity", &values, |limits| &mut limits.velocity)
+        self.set_limit("max_velocity", &values, f64::INFINITY, |limits| &mut limits.velocity)
     }
 
     /// Largest acceleration of every joint [rad/s² or m/s²], inf where unlimited; shape (n_joints,).
@@ -67,6 +69,16 @@ impl Rig {
 
     #[setter]
     fn set_max_acceleration(&mut self, values: Floats<'_>) -> PyResult<()> {
-        self.set_limit("max_acceleration", &values, |limits| &mut limits.acceleration)
+        self.set_limit("max_acceleration", &values, f64::INFINITY, |limits| &mut limits.acceleration)
     }
+}
+
+/// Bounds of joints, `None` where they are `unlimited`.
+pub fn bounds(what: &str, values: &Floats<'_>, n: usize, unlimited: f64) -> PyResult<Vec<Option<f64>>> {
+    let of = |value: f64| match value {
+        value if value == unlimited => Ok(None),
+        value if value.is_finite() => Ok(Some(value)),
+        value => Err(unusable(format!("{what}: {value} is no bound; {unlimited} is none at all"))),
+    };
+    list(what, values, n)?.into_iter().map(of).collect()
 }

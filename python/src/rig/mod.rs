@@ -4,6 +4,8 @@ mod numbers;
 mod prediction;
 mod views;
 
+pub use limits::bounds;
+
 use crate::errors::{raise, unusable};
 use handeye::Error;
 use handeye::chain::JointKind;

@@ -43,14 +43,13 @@ impl Rig {
         let chain = self.arm()?.joint_chain();
         let n = chain.len();
         let (samples, is_one) = rows_of("joints", &joints, n)?;
-        let mut posture = Default::default();
+        let (mut posture, mut columns) = (Default::default(), vec![[0.0; 6]; n]);
         let mut numbers = vec![0.0; samples.len() * 6 * n];
         for (joints, rows) in samples.iter().zip(numbers.chunks_exact_mut((6 * n).max(1))) {
             chain.posture(joints, &mut posture);
-            let tip = posture.tip().translation;
-            for (i, axis) in posture.axes.iter().enumerate() {
-                let (w, v) = axis.twist(&tip);
-                (0..3).for_each(|k| (rows[k * n + i], rows[(3 + k) * n + i]) = (w[k], v[k]));
+            posture.jacobian(&mut columns);
+            for (i, column) in columns.iter().enumerate() {
+                (0..6).for_each(|k| rows[k * n + i] = column[k]);
             }
         }
         Ok(array(py, &shape(samples.len(), is_one, &[6, n]), numbers))
@@ -70,12 +69,17 @@ impl Rig {
         for joints in &samples {
             let links = model.links(joints);
             for (index, (camera, numbers)) in model.cameras.iter().zip(&mut of_camera).enumerate() {
-                let size = self.inner.cameras[index].size.filter(|_| in_image);
+                let size = self.inner.cameras[index].size.filter(|_| in_image).map(|size| size.map(f64::from));
                 for feature in 0..n {
                     let point = model.in_camera(index, feature, &links);
-                    let pixel = camera.model.project(&camera.intrinsics, &point);
-                    let is_seen = camera.model.is_in_front(&point) && size.is_none_or(|size| is_inside(size, pixel));
-                    numbers.extend(if is_seen { pixel } else { [f64::NAN; 2] });
+                    let seen = match size {
+                        Some(size) => camera.pixel_inside(size, &point),
+                        None if camera.model.is_in_front(&point) => {
+                            Some(camera.model.project(&camera.intrinsics, &point))
+                        }
+                        None => None,
+                    };
+                    numbers.extend(seen.unwrap_or([f64::NAN; 2]));
                 }
             }
         }
@@ -109,9 +113,4 @@ impl Rig {
 /// The shape of an array with one entry per sample, or of its only entry.
 fn shape(samples: usize, is_one: bool, of_one: &[usize]) -> Vec<usize> {
     if is_one { of_one.to_vec() } else { [&[samples], of_one].concat() }
-}
-
-fn is_inside([width, height]: [u32; 2], [u, v]: [f64; 2]) -> bool {
-    let within = |x: f64, size: u32| x >= -0.5 && x < f64::from(size) - 0.5;
-    within(u, width) && within(v, height)
 }

@@ -2,9 +2,9 @@
 use super::decision::Decision;
 use super::limits::Limit;
 use super::step::read;
-use crate::arrays::{Floats, list, vector};
+use crate::arrays::{Floats, vector};
 use crate::errors::{raise, unusable};
-use crate::rig::Rig;
+use crate::rig::{Rig, bounds};
 use crate::sight::Layout;
 use handeye::infer::Sighting;
 use handeye::rig::{self, Joint, Limits};
@@ -90,8 +90,10 @@ impl Controller {
     ///
     /// Raises ``NotDone`` where what is seen determines no motion: hold the robot, and decide again on what is seen next.
     #[pyo3(signature = (pixels, joints = None, *, dt, time = 0.0, limits = None, points = None))]
+    #[expect(clippy::too_many_arguments, reason = "one keyword per measurement")]
     fn decide(
         &self,
+        py: Python<'_>,
         pixels: &Bound<'_, PyDict>,
         joints: Option<&Bound<'_, PyAny>>,
         dt: f64,
@@ -105,10 +107,14 @@ impl Controller {
         if let Some(joints) = joints {
             read("joints", joints, self.rig.robot.joints.len(), &mut readings)?;
         }
-        let limits: Vec<&dyn servo::Limit> =
-            limits.iter().flatten().map(|limit| &limit.get().inner as &dyn servo::Limit).collect();
-        let now = Measurement { time, joints: &readings, seen: &seen, points: &points };
-        let inner = self.shared.lock().any().decide(&now, &limits, dt).map_err(raise)?;
+        let limits: Vec<_> = limits.iter().flatten().map(|limit| &limit.get().inner).collect();
+        // Others run on while it thinks; the lock is taken without Python's, which a holder of it may wait for.
+        let decided = py.detach(|| {
+            let limits: Vec<&dyn servo::Limit> = limits.iter().map(|limit| *limit as &dyn servo::Limit).collect();
+            let now = Measurement { time, joints: &readings, seen: &seen, points: &points };
+            self.shared.lock().any().decide(&now, &limits, dt)
+        });
+        let inner = decided.map_err(raise)?;
         Ok(Decision { inner, rig: self.rig.clone() })
     }
 
@@ -277,19 +283,13 @@ impl UncalibratedJoints {
         takes: &str,
     ) -> PyResult<PyClassInitializer<Self>> {
         let n = lower.as_array().len();
-        let lower = list("lower", &lower, n)?;
-        let upper = list("upper", &upper, n)?;
-        let fastest =
-            max_velocity.map_or_else(|| Ok(vec![f64::INFINITY; n]), |fastest| list("max_velocity", &fastest, n))?;
-        let finite = |number: f64| number.is_finite().then_some(number);
+        let lower = bounds("lower", &lower, n, f64::NEG_INFINITY)?;
+        let upper = bounds("upper", &upper, n, f64::INFINITY)?;
+        let fastest = max_velocity
+            .map_or_else(|| Ok(vec![None; n]), |fastest| bounds("max_velocity", &fastest, n, f64::INFINITY))?;
         let joint = |i: usize| Joint {
             name: format!("j{}", i + 1),
-            limits: Limits {
-                lower: finite(lower[i]),
-                upper: finite(upper[i]),
-                velocity: finite(fastest[i]),
-                acceleration: None,
-            },
+            limits: Limits { lower: lower[i], upper: upper[i], velocity: fastest[i], acceleration: None },
             ..Joint::default()
         };
         let joints: Vec<Joint> = (0..n).map(joint).collect();

@@ -28,7 +28,7 @@ pub struct ServoLoop {
 
 #[pymethods]
 impl ServoLoop {
-    /// tolerance_px: mean pixel distance below which features are where they shall be. settled: measurements in a row within it. window:
+    /// tolerance_px: error below which features are where they shall be, as the mean of their pixel distances. settled: measurements in a row within it. window:
     /// measurements over which the error has to fall. diverged: times the first error at which the loop has diverged. timeout, watchdog
     /// (age of measurements on which nothing moves), patience (without a useful measurement) [s]. look_then_move: waits for a measurement
     /// from after the last motion before the next. follow: the target moves, and arriving does not end the loop.
@@ -85,6 +85,7 @@ impl ServoLoop {
     #[pyo3(signature = (now, pixels, joints = None, *, dt, time = None, limits = None, points = None))]
     fn tick(
         &mut self,
+        py: Python<'_>,
         now: f64,
         pixels: &Bound<'_, PyDict>,
         joints: Option<&Bound<'_, PyAny>>,
@@ -99,11 +100,15 @@ impl ServoLoop {
         if let Some(joints) = joints {
             read("joints", joints, self.rig.robot.joints.len(), &mut self.joints)?;
         }
-        let limits: Vec<&dyn servo::Limit> =
-            limits.iter().flatten().map(|limit| &limit.get().inner as &dyn servo::Limit).collect();
-        let measured =
-            Measurement { time: time.unwrap_or(now), joints: &self.joints, seen: &self.seen, points: &points };
-        let inner = self.inner.tick(now, &measured, &limits, dt).map_err(raise)?;
+        let limits: Vec<_> = limits.iter().flatten().map(|limit| &limit.get().inner).collect();
+        let (servo, joints, seen) = (&mut self.inner, &self.joints, &self.seen);
+        let ticked = py.detach(|| {
+            let limits: Vec<&dyn handeye::servo::Limit> =
+                limits.iter().map(|limit| *limit as &dyn handeye::servo::Limit).collect();
+            let measured = Measurement { time: time.unwrap_or(now), joints, seen, points: &points };
+            servo.tick(now, &measured, &limits, dt)
+        });
+        let inner = ticked.map_err(raise)?;
         Ok(Tick { inner, rig: self.rig.clone() })
     }
 }

@@ -97,8 +97,10 @@ impl Stepper {
             limits.iter().flatten().map(|limit| &limit.get().inner as &dyn servo::Limit).collect();
         let step = self.inner.step(&self.arm, &self.at, &goals, &limits, dt).clone();
         drop(goals);
-        if let Some(raised) = borrowed.iter().find_map(|(task, ..)| task.raised()) {
-            return Err(raised);
+        // All of them are taken, so that none is raised by a later step.
+        let raised: Vec<PyErr> = borrowed.iter().filter_map(|(task, ..)| task.raised()).collect();
+        if let Some(first) = raised.into_iter().next() {
+            return Err(first);
         }
         self.velocity.clear();
         self.velocity.extend(step.motion.iter().map(|motion| if dt > 0.0 { motion / dt } else { 0.0 }));

@@ -8,7 +8,7 @@ use handeye::servo::{Arm, Configuration, TaskRows};
 use numpy::ndarray::Ix2;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 /// Where a motion shall lead: the base class of all tasks.
 #[pyclass(module = "handeye.servo", subclass)]
@@ -210,8 +210,8 @@ pub struct Function {
 impl Function {
     fn rows(&self, at: &Configuration, rows: &mut TaskRows) {
         let added = Python::attach(|py| self.add(py, &at.joints, rows));
-        if let (Err(error), Ok(mut raised)) = (added, self.raised.lock()) {
-            raised.get_or_insert(error);
+        if let Err(error) = added {
+            self.raised.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
         }
     }
 

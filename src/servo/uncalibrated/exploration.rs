@@ -32,7 +32,7 @@ const NEAR: f64 = 0.05;
 /// Steps that trackers are waited for before the exploration goes on without them.
 const LOST: usize = 5;
 
-/// Steps that a waypoint, and trackers there, are waited for.
+/// Steps that a waypoint is waited for.
 const PATIENCE: usize = 200;
 
 /// A row has drifted where it comes back to the start off by this many variances, and by this many times those of the median row: others are
@@ -67,7 +67,8 @@ impl Explorer {
         Self::along(directions, settings.size, quantities, at, errors)
     }
 
-    /// To both sides along each of some directions, as far as there is room: what bends evenly then cancels.
+    /// To both sides along each of some directions, as far as there is room: what bends evenly then cancels. Where there is none along one of
+    /// them, as [`Explorer::new`].
     pub fn to_both_sides(
         directions: &[Vec<f64>],
         settings: &Exploration,
@@ -75,9 +76,16 @@ impl Explorer {
         at: &[f64],
         errors: &[f64],
     ) -> Self {
-        let sides = directions.iter().flat_map(|along| [1.0, -1.0].map(|way| along.iter().map(|a| way * a).collect()));
-        let sides = sides.filter(|along: &Vec<f64>| room(along, quantities, at) >= settings.size);
-        Self::along(sides.collect(), settings.size, quantities, at, errors)
+        let mut sides = Vec::new();
+        for along in directions {
+            let before = sides.len();
+            let both = [1.0, -1.0].map(|way| along.iter().map(|a| way * a).collect::<Vec<f64>>());
+            sides.extend(both.into_iter().filter(|along| room(along, quantities, at) >= settings.size));
+            if sides.len() == before {
+                return Explorer::new(settings, quantities, at, errors);
+            }
+        }
+        Self::along(sides, settings.size, quantities, at, errors)
     }
 
     fn along(directions: Vec<Vec<f64>>, size: f64, quantities: &[Quantity], at: &[f64], errors: &[f64]) -> Self {
@@ -125,8 +133,7 @@ impl Explorer {
             }
         }
         self.missing = 0;
-        let there = arrived;
-        if self.waits == 1 || !there && self.waits < PATIENCE {
+        if self.waits == 1 || !arrived && self.waits < PATIENCE {
             return Next::Towards(waypoint);
         }
         if k == self.directions.len() {

@@ -17,9 +17,11 @@ impl Uncalibrated {
     pub(super) fn explore(&mut self, readings: &[f64], errors: &[f64], limits: &LimitRows) -> Phase {
         let n = readings.len();
         if self.explorer.is_none() {
-            if self.seen.len() < errors.len() {
-                let [seen, all] = [self.seen.len(), errors.len()];
-                return Phase::Waiting(format!("{seen} of {all} rows are seen; exploring begins with all"));
+            // Rows that are lost when it is explored again may be lost for good.
+            let (seen, all) = (self.seen.len(), errors.len());
+            let needed = if self.losses == 0 { all } else { n };
+            if seen < needed {
+                return Phase::Waiting(format!("{seen} of {all} rows are seen; exploring begins with {needed}"));
             }
             if let Some([first, second]) = coinciding(&self.rows, errors) {
                 return Phase::Stopped(Stop::Undetermined(format!(

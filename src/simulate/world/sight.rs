@@ -1,6 +1,5 @@
 //! What the cameras of a world see.
 use super::{Moment, Object, World};
-use crate::reach::pixel_inside;
 use crate::recording::{Detection, PointDetection, Sample};
 use crate::rig::{Model, ModelFeature, Parent};
 use handeye_solvers::Pose;
@@ -79,7 +78,7 @@ impl World {
             let world_from_camera = model.carrier(camera.parent, links) * camera.pose;
             for (point, &feature) in in_world.iter().zip(&self.places) {
                 let point = world_from_camera.inverse_transform(point);
-                let pixel = pixel_inside(camera, self.sizes[index], &point);
+                let pixel = camera.pixel_inside(self.sizes[index], &point);
                 let detection = |pixel| Detection { camera: index as u32, feature, pixel };
                 seen.extend(pixel.map(|pixel| InView { detection: detection(pixel), point }));
             }
