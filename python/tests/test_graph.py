@@ -141,3 +141,12 @@ def test_shapes_are_told_in_words():
             wrong()
     with pytest.raises(handeye.NotDone, match="nothing to estimate"):
         handeye.Graph().minimize()
+
+
+def test_a_node_of_another_graph_is_refused_even_where_there_is_one_like_it():
+    graph, other = handeye.Graph(), handeye.Graph()
+    x, y = graph.vector([1.0, 2.0]), other.vector([3.0, 4.0])
+    for wrong in (lambda: graph.value(y), lambda: graph.factor(lambda y: y, y), lambda: graph.prior(y, [0.0, 0.0], 1.0)):
+        with pytest.raises(handeye.UnusableInput, match="is of another graph"):
+            wrong()
+    np.testing.assert_array_equal(graph.value(x), [1.0, 2.0])

@@ -103,6 +103,10 @@ def test_shapes_that_do_not_fit_are_refused_in_words():
         ({"poses": np.zeros((4, 4, 4))}, "poses, sample 0: a pose is a homogeneous matrix"),
         ({"joints": joints, "cameras": {"c": {"focal": 1.0}}}, r"camera `c`: unknown key `focal` \(known: size"),
         ({"joints": joints, "cameras": {"c": {"model": "fisheye"}}}, "unknown model `fisheye` \\(known: pinhole"),
+        (
+            {"targets": {"c": {"board": np.tile(np.eye(4), (4, 1, 1))}}, "target_covariances": {"c": {"bord": np.zeros((4, 6, 6))}}},
+            "target_covariances: there are no `targets` of camera `c`, `bord`",
+        ),
         ({}, "no array is given"),
     ]:
         with pytest.raises(handeye.UnusableInput, match=message):

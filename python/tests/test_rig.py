@@ -120,6 +120,16 @@ def test_limits_noise_and_what_is_held_survive_a_file(ur5, tmp_path):
     assert again.fixed == ["cameras.*.cx", "cameras.*.cy"] and again.prior == {"cameras.*.fx": 10.0}
 
 
+@pytest.mark.parametrize("name", ["lower", "upper", "max_velocity", "max_acceleration"])
+def test_what_is_no_bound_is_refused_and_changes_nothing(ur5, name):
+    rig = ur5.copy()
+    unlimited = -np.inf if name == "lower" else np.inf
+    for wrong in (np.nan, -unlimited):
+        with pytest.raises(handeye.UnusableInput, match=f"{name}: .* is no bound"):
+            setattr(rig, name, [unlimited, wrong, 1.0, 1.0, 1.0, 1.0])
+        assert rig == ur5
+
+
 def test_comments_of_a_file_survive(tmp_path):
     path = tmp_path / "rig.toml"
     path.write_text('# mine\n[[cameras]]\nname = "left"  # the one at the window\nfx = 600.0\n')

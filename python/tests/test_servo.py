@@ -72,6 +72,8 @@ def test_a_task_of_ones_own_does_what_the_built_in_one_does(ur5, places):
 
     with pytest.raises(LookupError, match="no such place"):
         servo.Stepper(ur5).step(places[0], [servo.FunctionTask(fail)], dt=0.1)
+    with pytest.raises(handeye.UnusableInput, match=r"joint target: shape \[7\], and \(6,\) would do"):
+        servo.Stepper(ur5).step(places[0], [servo.JointTarget(np.zeros(7))], dt=0.1)
     with pytest.raises(handeye.UnusableInput, match=r"slopes: shape \[6, 5\], and \(6, 6\) would do"):
         servo.Stepper(ur5).step(places[0], [servo.FunctionTask(lambda joints: (joints, np.ones((6, 5))))], dt=0.1)
 

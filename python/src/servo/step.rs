@@ -88,6 +88,7 @@ impl Stepper {
                 }
                 Err(_) => (goal.cast::<Task>()?.try_borrow()?, 0, 1.0),
             });
+            borrowed.last().map_or(Ok(()), |(task, ..)| task.fits(n))?;
         }
         let goals: Vec<servo::Goal<'_>> = borrowed
             .iter()

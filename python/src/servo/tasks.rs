@@ -233,10 +233,21 @@ impl Function {
 }
 
 impl Task {
+    /// Whether it is a task of an arm with so many joints.
+    pub fn fits(&self, n_joints: usize) -> PyResult<()> {
+        match &self.inner {
+            Kind::JointTarget(task) if task.joints.len() != n_joints => {
+                let found = task.joints.len();
+                Err(unusable(format!("joint target: shape [{found}], and ({n_joints},) would do")))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// What a function of the task has raised since it was last asked.
     pub fn raised(&self) -> Option<PyErr> {
         match &self.inner {
-            Kind::Function(function) => function.raised.lock().ok()?.take(),
+            Kind::Function(function) => function.raised.lock().unwrap_or_else(PoisonError::into_inner).take(),
             _ => None,
         }
     }
