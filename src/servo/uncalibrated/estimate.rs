@@ -189,8 +189,8 @@ impl Estimate {
         }
     }
 
-    /// An error was measured [px]. What it differs by from what was expected, and the variance of that.
-    pub(super) fn measured(&mut self, row: usize, error: f64) -> [f64; 2] {
+    /// An error was measured [px].
+    pub(super) fn measured(&mut self, row: usize, error: f64) {
         let size = self.n + 1;
         let state = &mut self.states[row * size..(row + 1) * size];
         let entries = &mut self.covariances[row * size * size..(row + 1) * size * size];
@@ -209,7 +209,6 @@ impl Estimate {
             entries[i] *= 1.0 - own;
             entries[i * size] = entries[i];
         }
-        [surprise, total]
     }
 
     /// Takes an error for what it is measured to be [px], and its noise for independent of the slopes.
@@ -241,12 +240,6 @@ impl Estimate {
         slopes.iter_mut().zip(changes).for_each(|(slope, change)| *slope += change);
     }
 
-    /// Variance of what is to be measured of a row [px²], and what is expected.
-    pub(super) fn expected(&self, row: usize) -> [f64; 2] {
-        let size = self.n + 1;
-        [self.states[row * size], self.covariances[row * size * size] + self.variances[row]]
-    }
-
     /// What a row's error is expected to be after a motion [px], and the variance of what is then measured [px²].
     pub fn foresee(&self, row: usize, motion: &[f64]) -> [f64; 2] {
         [self.error(row) + dot(self.slopes(row), motion), self.variance_along(row, motion)]
@@ -261,16 +254,11 @@ impl Estimate {
         entries[0] + 2.0 * across + self.doubt(row, motion) + bend + (1.0 + WANDER * WANDER) * self.variances[row]
     }
 
-    /// Each of a row's slopes was less certain before the last motion by this variance.
-    pub(super) fn loosen(&mut self, row: usize, variance: f64, motion: &[f64]) {
+    /// Counts each of a row's slopes as less certain by a variance.
+    pub(super) fn loosen(&mut self, row: usize, variance: f64) {
         let size = self.n + 1;
         let entries = &mut self.covariances[row * size * size..(row + 1) * size * size];
-        entries[0] += variance * dot(motion, motion);
-        for (i, motion) in motion.iter().enumerate() {
-            entries[i + 1] += variance * motion;
-            entries[(i + 1) * size] += variance * motion;
-            entries[(i + 1) * size + i + 1] += variance;
-        }
+        (1..size).for_each(|i| entries[i * size + i] += variance);
     }
 
     /// Forgets: the covariance of all slopes grows by a factor.

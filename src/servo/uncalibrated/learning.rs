@@ -16,8 +16,12 @@ pub(super) struct Lesson<'a> {
 }
 
 /// Bounds of the ratio of a squared surprise to the expected one by which the curvature follows, and of the curvature over its setting.
-const SURPRISE: [f64; 2] = [0.2, 5.0];
-const CURVATURES: [f64; 2] = [0.5, 3.0];
+const SURPRISE: [f64; 2] = [0.2, 30.0];
+const CURVATURES: [f64; 2] = [0.5, 10.0];
+
+/// The power of that ratio: ½ is what explains the surprise best, which caution takes whole; confidence grows half as fast.
+const UP: f64 = 0.5;
+const DOWN: f64 = 0.25;
 
 /// Median of χ² with 1 degree of freedom, and by how much the ratio may exceed that of the median row.
 const MEDIAN: f64 = 0.455;
@@ -71,16 +75,27 @@ fn tells(estimate: &Estimate, lesson: &Lesson<'_>, gate: f64) -> bool {
 }
 
 fn filter(setting: f64, estimate: &mut Estimate, lesson: &Lesson<'_>) {
-    estimate.moved(lesson.motion, estimate.curvature);
+    // First how far slopes are to be trusted, then what this motion teaches: a surprise is neither learned from as if it had been expected,
+    // nor are slopes trusted after it as if there had been none.
     if let Some(rows) = lesson.modelled {
         doubt(rows, estimate, lesson);
     }
+    bend(setting, estimate, lesson);
+    estimate.moved(lesson.motion, estimate.curvature);
+    for &row in lesson.seen {
+        estimate.measured(row, lesson.now[row]);
+    }
+}
+
+/// The curvature follows the surprise that a motion is.
+fn bend(setting: f64, estimate: &mut Estimate, lesson: &Lesson<'_>) {
     let (mut surprise, mut expected, mut noise) = (0.0, 0.0, 0.0);
     let mut each = Vec::with_capacity(lesson.seen.len());
     for &row in lesson.seen {
-        let [difference, variance] = estimate.measured(row, lesson.now[row]);
-        each.push(difference * difference / variance);
-        surprise += difference * difference;
+        let [there, variance] = estimate.foresee(row, lesson.motion);
+        let square = (lesson.now[row] - there).powi(2);
+        each.push(square / variance);
+        surprise += square;
         expected += variance;
         noise += 2.0 * estimate.variance(row);
     }
@@ -89,7 +104,8 @@ fn filter(setting: f64, estimate: &mut Estimate, lesson: &Lesson<'_>) {
         let middle = each.len() / 2;
         let median = *each.select_nth_unstable_by(middle, f64::total_cmp).1 / MEDIAN;
         let ratio = (surprise / expected).min(ALONE * median).clamp(SURPRISE[0], SURPRISE[1]);
-        let curvature = estimate.curvature * ratio.powf(0.25 * (1.0 - noise / expected));
+        let power = if ratio > 1.0 { UP } else { DOWN };
+        let curvature = estimate.curvature * ratio.powf(power * (1.0 - noise / expected));
         estimate.curvature = curvature.clamp(CURVATURES[0] * setting, CURVATURES[1] * setting);
     }
 }
@@ -109,8 +125,8 @@ fn doubt(rows: &[Row], estimate: &mut Estimate, lesson: &Lesson<'_>) {
         let of_camera = || lesson.seen.iter().copied().filter(|&row| rows[row].camera == camera);
         let (mut ratio, mut excess, mut scale, mut count) = (0.0, 0.0, 0.0, 0.0_f64);
         for row in of_camera() {
-            let [expected, variance] = estimate.expected(row);
-            let surprise = (lesson.now[row] - expected).powi(2);
+            let [there, variance] = estimate.foresee(row, lesson.motion);
+            let surprise = (lesson.now[row] - there).powi(2);
             ratio += surprise / variance;
             excess += surprise - variance;
             scale += estimate.scale(row);
@@ -118,7 +134,7 @@ fn doubt(rows: &[Row], estimate: &mut Estimate, lesson: &Lesson<'_>) {
         }
         if ratio > count + SURPRISED * (2.0 * count).sqrt() && scale > 0.0 && excess > 0.0 {
             let share = excess / (square * scale);
-            of_camera().for_each(|row| estimate.loosen(row, share * estimate.scale(row), lesson.motion));
+            of_camera().for_each(|row| estimate.loosen(row, share * estimate.scale(row)));
         }
     }
 }

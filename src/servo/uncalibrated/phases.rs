@@ -1,6 +1,6 @@
 //! What each phase does: exploring, servoing, and what follows where the Jacobian is lost.
 use super::controller::Uncalibrated;
-use super::estimate::dot;
+use super::estimate::{Estimate, dot};
 use super::exploration::{Explorer, Next};
 use super::settings::Update;
 use super::signals::{Phase, Stop};
@@ -42,7 +42,12 @@ impl Uncalibrated {
             }
             Next::Done(mut estimate) => {
                 let (condition, worst) = (estimate.condition(), self.settings.worst_condition);
-                if condition.is_nan() || condition > worst {
+                let is_poor = condition.is_nan() || condition > worst;
+                if is_poor && let Some(good) = self.good.take_if(|_| self.losses > 0) {
+                    // What was known before shows more.
+                    return self.go_back_to(good, readings, errors, limits);
+                }
+                if is_poor {
                     return Phase::Stopped(Stop::Undetermined(format!(
                         "the exploratory motions look alike, with a condition number of {condition:.0} above {worst:.0}: \
                          see from more sides, or more features"
@@ -135,6 +140,12 @@ impl Uncalibrated {
         self.explore(readings, errors, limits)
     }
 
+    fn go_back_to(&mut self, mut good: Estimate, readings: &[f64], errors: &[f64], limits: &LimitRows) -> Phase {
+        self.seen.iter().for_each(|&row| good.reset(row, errors[row]));
+        (self.estimate, self.explorer) = (Some(good), None);
+        self.servo(readings, errors, limits)
+    }
+
     fn solve(&mut self, limits: &LimitRows) {
         let Step { motion, active, conflict, .. } = self.solver.solve(&self.tasks, limits, &self.bounds);
         self.motion.copy_from_slice(motion);
@@ -154,11 +165,7 @@ impl Uncalibrated {
             _ if self.losses > LOSSES => Phase::Stopped(Stop::Undetermined(
                 "the Jacobian lost its rank again and again: see from more sides, or more features".to_owned(),
             )),
-            Some(mut good) => {
-                self.seen.iter().for_each(|&row| good.reset(row, errors[row]));
-                self.estimate = Some(good);
-                self.servo(readings, errors, limits)
-            }
+            Some(good) => self.go_back_to(good, readings, errors, limits),
             None => {
                 (self.estimate, self.ahead) = (None, None);
                 self.dropped.clear();
