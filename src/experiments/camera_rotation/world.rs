@@ -261,8 +261,9 @@ impl Controlled for World {
         World::errors(self)
     }
 
-    fn carry_out(&mut self, motion: &[f64]) {
+    fn carry_out(&mut self, motion: &[f64]) -> Result<(), Error> {
         let there: Vec<f64> = self.joints().iter().zip(motion).map(|(joint, motion)| joint + motion).collect();
         self.move_to(&there);
+        Ok(())
     }
 }

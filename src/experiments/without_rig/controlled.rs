@@ -20,7 +20,9 @@ pub trait Controlled {
     fn errors(&mut self) -> Vec<f64>;
 
     /// Moves every quantity by this much, in its unit.
-    fn carry_out(&mut self, motion: &[f64]);
+    ///
+    /// Errors: [`Error::Unusable`] for what cannot be carried out.
+    fn carry_out(&mut self, motion: &[f64]) -> Result<(), Error>;
 }
 
 /// How servoing went.
@@ -64,7 +66,7 @@ pub fn serve<W: Controlled>(
             break;
         }
         if course.errors.len() <= commands {
-            world.carry_out(&motion);
+            world.carry_out(&motion)?;
         }
     }
     Ok(course)

@@ -127,12 +127,13 @@ impl Controlled for Flight {
         self.task.values(&seen)
     }
 
-    fn carry_out(&mut self, motion: &[f64]) {
+    fn carry_out(&mut self, motion: &[f64]) -> Result<(), Error> {
         let mut normal = || self.random.sample::<f64, _>(StandardNormal);
         let turn = motion[0] * (1.0 + SHARE * normal()) + HEADING * normal();
         self.drone.yaw += turn + self.wind;
         self.time += 1.0;
         self.fly();
+        Ok(())
     }
 }
 

@@ -95,7 +95,7 @@ impl Pressing {
         let mut arm = SpringArm::new(&rig, &START, spring)?;
         // The spring takes hold.
         let centre = tool - BELOW * Vector3::z();
-        arm.pull(&tool, &centre, 1.0);
+        arm.pull(&tool, &centre, 1.0)?;
         Ok(Pressing { arm, centre, target, task, geometry, random, least_contact: f64::INFINITY })
     }
 
@@ -132,13 +132,14 @@ impl Controlled for Pressing {
         self.task.values(&seen)
     }
 
-    fn carry_out(&mut self, motion: &[f64]) {
+    fn carry_out(&mut self, motion: &[f64]) -> Result<(), Error> {
         let there = self.centre + UNIT * Vector3::new(motion[0], motion[1], 0.0);
         // The centre is kept below the tool, which presses with the same force wherever it is.
         let there = Vector3::new(there.x, there.y, self.arm.tip().translation.z - BELOW);
-        self.arm.pull(&self.centre, &there, 1.0);
+        self.arm.pull(&self.centre, &there, 1.0)?;
         self.centre = there;
         self.least_contact = self.least_contact.min(self.arm.contact());
+        Ok(())
     }
 }
 
