@@ -1,6 +1,6 @@
 //! A virtual spring: its centre is moved over a table on which the arm presses, until the tool is seen at a target.
 use super::controlled::{Controlled, serve};
-use super::scenes::{curve, looking};
+use super::scenes::{curve, view};
 use crate::Error;
 use crate::camera::{CameraModel, PARAMETERS};
 use crate::experiments::setting::trials;
@@ -74,16 +74,12 @@ impl Pressing {
         let middle = 0.5 * (tool + target);
         let mut intrinsics = [0.0; PARAMETERS];
         intrinsics[..4].copy_from_slice(&[800.0, 800.0, 320.0, 240.0]);
-        let view = |from: Vector3<f64>| View {
-            model: CameraModel::Pinhole,
-            intrinsics,
-            pose: looking(middle + from, middle, -Vector3::z()),
-            on_hand: false,
-        };
-        let geometry = Geometry {
-            cameras: vec![view(Vector3::new(0.5, -0.6, 0.6)), view(Vector3::new(0.6, 0.5, 0.7))],
-            points: vec![Vector3::zeros(), target],
-        };
+        let mut cameras = Vec::new();
+        for from in [Vector3::new(0.5, -0.6, 0.6), Vector3::new(0.6, 0.5, 0.7)] {
+            let pose = view(&(middle + from), &middle, &-Vector3::z())?;
+            cameras.push(View { model: CameraModel::Pinhole, intrinsics, pose, on_hand: false });
+        }
+        let geometry = Geometry { cameras, points: vec![Vector3::zeros(), target] };
         let features = vec![
             Feature { name: "tool".to_owned(), place: Place::Hand(None) },
             Feature { name: "mark".to_owned(), place: Place::Target(None) },
@@ -170,8 +166,10 @@ fn run(options: &Options) -> Result<Outcome, Error> {
     }
     rows.extend(ends);
     notes.push(format!(
-        "at rest the tool presses with K times {BELOW} m: {} N; friction then holds it where the centre is within 4 and 10 mm of it",
-        STIFFNESS * BELOW
+        "at rest the tool presses with K times {BELOW} m: {} N; friction then holds it where the centre is within {} mm of it",
+        STIFFNESS * BELOW,
+        // Coulomb's μ K below = K off.
+        FRICTION.map(|(_, friction)| format!("{:.0}", 1e3 * friction * BELOW)).join(", ")
     ));
     notes.push("published in words: contacts between a solid table and the robot could safely be made".to_owned());
     Ok(Outcome {
