@@ -1,5 +1,5 @@
 //! What servoing without a rig promises: the same step and limits, from a Jacobian that is estimated on the way.
-use handeye::experiments::camera_rotation::{Run, Scene, Tracker, View, World, carried_around, serve};
+use handeye::experiments::camera_rotation::{Run, Scene, Tracker, View, World, carried_around, servo};
 use handeye::experiments::{Options, Outcome, find};
 use handeye::rig::Limits;
 use handeye::servo::uncalibrated::{Estimate, Exploration, Phase, Quantity, Row, Settings, Stop, Uncalibrated, Update};
@@ -123,7 +123,7 @@ fn two_views_at_about_a_right_angle_serve_best_and_one_point_of_view_is_refused_
     let of = |first: f64, apart_deg: f64| {
         let views = [first, first + apart_deg.to_radians()].map(|angle| View { angle, beside: 0.0, distance: 1.0 });
         let mut world = World::new(&Scene::RECONSTRUCTED, &views, Tracker::Perfect, 1).unwrap();
-        (serve(&mut world, &Settings::plain(0.5, 0.1)).unwrap(), world.joints().to_vec())
+        (servo(&mut world, &Settings::plain(0.5, 0.1)).unwrap(), world.joints().to_vec())
     };
     // The condition number, and what 50 iterations leave; the thesis has both smallest where cameras are orthogonal.
     let around = |apart_deg: f64| -> [f64; 2] {

@@ -1,8 +1,8 @@
 //! A virtual spring: its centre is moved over a table on which the arm presses, until the tool is seen at a target.
-use super::controlled::{Controlled, serve};
 use super::scenes::{curve, view};
 use crate::Error;
 use crate::camera::{CameraModel, PARAMETERS};
+use crate::experiments::controlled::{Controlled, servo};
 use crate::experiments::setting::trials;
 use crate::experiments::{Experiment, Options, Outcome, Row};
 use crate::rig::{Model, Rig, catalog};
@@ -48,7 +48,7 @@ const NOISE: f64 = 0.3;
 
 /// Commands after exploring, and what is shown.
 const COMMANDS: usize = 40;
-const SHOWN: (usize, usize) = (40, 4);
+const SHOWN: (usize, usize) = (COMMANDS, 4);
 
 /// An arm on a table, seen by two cameras.
 struct Pressing {
@@ -191,13 +191,11 @@ fn press(friction: f64, seed: u64) -> Result<Pressed, Error> {
     // What sticks and slips teaches nothing of the slopes.
     let settings = Settings { exploration, update: Update::Keep, ..Settings::default() };
     let mut curves: [Vec<Option<f64>>; 3] = Default::default();
-    let course = serve(&mut world, &settings, COMMANDS, &mut |world, phase| {
-        if *phase != crate::servo::uncalibrated::Phase::Exploring {
-            curves[1].push(Some(1e3 * world.off()));
-            curves[2].push(Some(world.arm.contact()));
-        }
+    let found = servo(&mut world, &settings, COMMANDS, &mut |world, _| {
+        curves[1].push(Some(1e3 * world.off()));
+        curves[2].push(Some(world.arm.contact()));
     })?;
     // Four rows, of which the sum of the absolute errors is known.
-    curves[0] = course.errors.iter().map(|sum| Some(sum / 4.0)).collect();
-    Ok(Pressed { curves, least_contact: world.least_contact, stopped: course.stop.is_some() })
+    curves[0] = found.errors.iter().map(|sum| Some(sum / 4.0)).collect();
+    Ok(Pressed { curves, least_contact: world.least_contact, stopped: found.stop.is_some() })
 }
