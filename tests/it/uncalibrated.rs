@@ -98,6 +98,20 @@ fn the_tables_of_the_thesis_come_out_as_an_independent_reconstruction_has_them()
 }
 
 #[test]
+fn the_first_trial_around_the_target_is_the_reconstructed_scene_whatever_the_seed_and_the_others_are_drawn() {
+    for name in ["figure5.9", "figure5.10"] {
+        let run = |trials: usize, seed: u64| find(name).unwrap().run(&Options { trials, seed }).unwrap();
+        // Perfect trackers: nothing else is drawn.
+        let first = run(1, 1);
+        assert_eq!(first.rows, run(1, 7).rows, "{name}");
+        let [one, other] = [run(2, 1), run(2, 7)];
+        assert_ne!(one.rows, other.rows, "{name}");
+        let values = |outcome: &Outcome| outcome.rows.iter().find(|row| row.values.len() == 2).unwrap().values.clone();
+        assert_eq!(values(&one)[0], values(&other)[0], "{name}");
+    }
+}
+
+#[test]
 fn no_place_of_the_cameras_diverges_and_all_arrive_sooner_than_with_a_jacobian_that_is_kept() {
     for tracker in TRACKERS {
         for (size, gain) in [(2.0_f64, 1.0), (6.0, 0.25), (6.0, 0.5), (6.0, 1.0), (10.0, 0.75)] {
