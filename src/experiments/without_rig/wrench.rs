@@ -63,11 +63,8 @@ fn run(options: &Options) -> Result<Outcome, Error> {
     let is_right = |run: &Run| run.moments.last().is_some_and(|end| turned(end) < SAME);
     let is_other = |run: &Run| run.moments.last().is_some_and(|end| turned(end) >= 180.0 - SAME);
     let untold: Vec<Run> = (0..TURNS.len()).flat_map(|turn| of(turn, false)).collect();
-    let mut notes = vec![format!(
-        "errors at the end: {} on the right side, {} on the other",
-        left(&untold, is_right),
-        left(&untold, is_other)
-    )];
+    let sides = [end(&untold, "on the right side", is_right), end(&untold, "on the other", is_other)];
+    let mut notes = vec![sides.join(", ")];
     notes.push("how runs end, by how far they begin turned:".to_owned());
     for told in [false, true] {
         for (index, turn) in TURNS.iter().enumerate() {
@@ -91,10 +88,10 @@ fn run(options: &Options) -> Result<Outcome, Error> {
     }
     let beyond: Vec<Run> =
         (0..TURNS.len()).filter(|turn| TURNS[*turn] > 90.0).flat_map(|turn| of(turn, true)).collect();
+    let sides = [end(&beyond, "on the right side", is_right), end(&beyond, "elsewhere", |run| !is_right(run))];
     notes.push(format!(
-        "`side told` adds parallel lines with a direction: what then begins beyond 90° has {} on the right side, {} elsewhere",
-        left(&beyond, is_right),
-        left(&beyond, |run| !is_right(run))
+        "`side told` adds parallel lines with a direction; of what then begins beyond 90°, {}",
+        sides.join(", ")
     ));
     notes.push(
         "published in words: an unexpected solution, the wrench's other points towards the left or the right, for the same errors".to_owned(),
@@ -108,13 +105,13 @@ fn run(options: &Options) -> Result<Outcome, Error> {
     })
 }
 
-/// What is left of the errors of the runs that end there, in words.
-fn left(runs: &[Run], is_there: impl Fn(&Run) -> bool) -> String {
+/// How many of the runs end there, and what is left of their errors.
+fn end(runs: &[Run], place: &str, is_there: impl Fn(&Run) -> bool) -> String {
     let there: Vec<&Run> = runs.iter().filter(|run| is_there(run)).collect();
     let errors: Vec<Option<f64>> = there.iter().map(|run| run.moments.last().and_then(|end| end.error_px)).collect();
     let median = Row::new("", None, &errors).median();
-    let median = median.map_or(String::new(), |median| format!(", {median:.2} px in the median"));
-    format!("{} runs{median}", there.len())
+    let median = median.map_or(String::new(), |median| format!(" with {median:.2} px in the median"));
+    format!("{} of {} end {place}{median}", there.len(), runs.len())
 }
 
 /// Runs by whether the side is told, then by turn.
