@@ -56,7 +56,7 @@ impl Servo {
     pub fn run(&self, is_json: bool) -> Result<Answer, Error> {
         let input = self.rig.as_deref().map(read_rig).transpose()?;
         let mut scene = read_scene(&self.scene)?;
-        let inputs: Vec<PathBuf> = self.rig.iter().chain([&self.scene]).cloned().collect();
+        let inputs: Vec<PathBuf> = self.rig.iter().chain([&self.scene]).chain(&scene.files).cloned().collect();
         for output in self.plot.iter().chain(&self.report) {
             check_output(output, &inputs)?;
         }

@@ -4,6 +4,7 @@
 //!
 //! One file each; being listed in [`ALL`] is what runs it from the command line and covers it by the tests.
 pub mod camera_rotation;
+mod controlled;
 mod figure10;
 mod figure11;
 mod figure3;

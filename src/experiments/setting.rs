@@ -57,11 +57,15 @@ pub(super) fn trials<T: Send>(
     options: &Options,
     trial: impl Fn(u64) -> Result<T, Error> + Sync,
 ) -> Result<Vec<T>, Error> {
-    // Seeds of runs with neighbouring `seed` do not overlap before a million trials.
-    let first = options.seed.wrapping_mul(1_000_000) & !HELD_OUT;
+    let first = first_seed(options);
     let results: Vec<Result<T, Error>> =
         (0..options.trials as u64).into_par_iter().map(|index| trial(first.wrapping_add(index))).collect();
     results.into_iter().collect()
+}
+
+/// Seed of the first trial; those of runs with neighbouring `seed` do not overlap before a million trials.
+pub(super) fn first_seed(options: &Options) -> u64 {
+    options.seed.wrapping_mul(1_000_000) & !HELD_OUT
 }
 
 /// Trials by figure instead of figures by trial.

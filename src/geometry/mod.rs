@@ -3,6 +3,7 @@
 //! Points are in metres (or any other unit), bearings are unit directions in a camera's frame
 //! (`CameraModel::unproject`), so that every camera model fits. Degenerate input gives `None` or an empty list.
 mod alignment;
+mod between;
 mod daniilidis;
 mod essential;
 mod five_point;
@@ -21,6 +22,7 @@ mod sampson;
 mod triangulation;
 
 pub use alignment::{Similarity, align, align_robust, align_similarity};
+pub use between::{between, looking_at};
 pub use daniilidis::hand_eye_daniilidis;
 pub use essential::{decompose, essential, in_front_of_both};
 pub use five_point::five_point;

@@ -1,6 +1,6 @@
 //! What changes with time, between the moments at which it was measured.
+use crate::geometry;
 use handeye_solvers::Pose;
-use handeye_solvers::manifold::so3;
 
 /// What can be interpolated.
 pub(in crate::recording) trait Between {
@@ -15,13 +15,8 @@ impl Between for Vec<f64> {
 }
 
 impl Between for Pose {
-    /// The origin on a line, the rotation about one axis at one speed (slerp).
     fn between(&self, other: &Self, weight: f64) -> Self {
-        let turn = so3::log(&(self.rotation.transpose() * other.rotation));
-        Pose {
-            rotation: self.rotation * so3::exp(&(turn * weight)),
-            translation: self.translation + (other.translation - self.translation) * weight,
-        }
+        geometry::between(self, other, weight)
     }
 }
 

@@ -1,5 +1,9 @@
 //! Scenes: a world, a target, a controller and its limits in a file, run to the end.
 mod catalog;
+mod check;
+mod controllers;
+mod limits;
+mod named;
 mod place;
 mod plot;
 mod read;
@@ -11,8 +15,8 @@ mod run;
 mod target;
 
 pub use catalog::ALL;
+pub use named::{NamedCoupling, NamedFault, NamedSlip};
 pub use plot::svg;
-pub use read_faults::{NamedCoupling, NamedFault, NamedSlip};
 pub use run::{Moment, Run, run};
 pub use target::{Target, Waypoint};
 
@@ -23,6 +27,7 @@ use crate::servo::uncalibrated::Settings;
 use crate::servo::{ImageSettings, LoopSettings, PoseSettings, Takes};
 use crate::simulate::world::WorldOptions;
 use nalgebra::Vector3;
+use std::path::PathBuf;
 
 /// What happens in a closed loop, apart from the rig that the controller knows.
 #[derive(Clone, Debug)]
@@ -49,7 +54,8 @@ pub struct Scene {
     pub start: Vec<f64>,
     /// Where the arm shall be, which may move.
     pub target: Target,
-    /// What turns measurements into commands; `None` is [`Control::ModelBased`] with a rig, and [`Control::Uncalibrated`] without.
+    /// What turns measurements into commands; `None` is [`Control::ModelBased`] with a rig and without a task, and else
+    /// [`Control::Uncalibrated`].
     pub control: Option<Control>,
     /// Limits beside those of the joints, by name.
     pub limits: Vec<(String, LimitKind)>,
@@ -57,6 +63,8 @@ pub struct Scene {
     pub settings: LoopSettings,
     /// Seconds from one command to the next.
     pub dt: f64,
+    /// Files that it was read from beside its own: its rig, its task, the recording of its target's path.
+    pub files: Vec<PathBuf>,
 }
 
 /// A controller and its settings.
@@ -91,14 +99,15 @@ impl Control {
     }
 }
 
-/// How [`crate::servo::UncalibratedJoints`] servoes in a scene.
+/// How [`crate::servo::UncalibratedJoints`] servoes in a scene, and [`crate::servo::UncalibratedTask`] in one with a task.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UncalibratedControl {
     /// Standard deviation that trackers are taken to have [px]; a task has its own.
     pub pixels: f64,
     /// Gain, exploration, and how what is known is updated and trusted.
     pub settings: Settings,
-    /// Motions of a joint that it takes for too small to be carried out [rad or m].
+    /// Motions of a joint that it takes for too small to be carried out [rad or m]; of a robot that is moved by its tip, see
+    /// [`crate::servo::UncalibratedTask::dead_band`].
     pub dead_band: f64,
     /// True where the rig that is known is followed as far as it is right, false where it is not even looked at.
     pub hybrid: bool,

@@ -3,7 +3,7 @@ use super::Scene;
 use crate::Error;
 use crate::recording::{Detection, Recording};
 use crate::rig::{Camera, Feature, Model, Parent, Rig};
-use crate::servo::image_tasks::{ImageTask, Place};
+use crate::servo::image_tasks::{Found, ImageTask, Place};
 use crate::simulate::world::{Object, World};
 use handeye_solvers::Pose;
 
@@ -86,39 +86,15 @@ fn names(task: &ImageTask) -> Rig {
 
 /// The rig with the features of a task in place of its own, and which of them the target carries.
 fn with_task(truth: &Rig, task: &ImageTask) -> Result<(Rig, Vec<usize>), Error> {
-    for name in task.cameras() {
-        if !truth.cameras.iter().any(|camera| camera.name == *name) {
-            let known: Vec<&str> = truth.cameras.iter().map(|camera| camera.name.as_str()).collect();
-            let known = known.join(", ");
-            return Err(Error::Unusable(format!(
-                "camera `{name}` of the scene's task is not one of its rig (known: {known})"
-            )));
-        }
-    }
     let (mut features, mut carried) = (Vec::new(), Vec::new());
-    for feature in task.features() {
-        let is_target = matches!(feature.place, Place::Target(_));
-        match feature.place {
-            Place::Image(_) => {}
-            Place::Hand(Some(xyz)) | Place::Target(Some(xyz)) => {
-                carried.extend(is_target.then_some(features.len()));
+    for (feature, found) in task.features().iter().zip(task.in_rig(truth)?.features) {
+        match found {
+            Found::Image => {}
+            Found::Task(xyz) => {
+                carried.extend(matches!(feature.place, Place::Target(_)).then_some(features.len()));
                 features.push(Feature { name: feature.name.clone(), parent: Parent::Tip, xyz: Some(xyz.into()) });
             }
-            Place::Hand(None) | Place::Target(None) => {
-                let found = truth.features.iter().find(|known| known.name == feature.name).ok_or_else(|| {
-                    let (name, place) = (&feature.name, feature.place.name());
-                    Error::Unusable(format!(
-                        "feature `{name}` on {place} is not in the scene's rig: give its `xyz` in the task"
-                    ))
-                })?;
-                if (found.parent == Parent::World) != is_target {
-                    let (name, place) = (&feature.name, feature.place.name());
-                    return Err(Error::Unusable(format!(
-                        "feature `{name}` is on {place} in the task, and not so in the rig"
-                    )));
-                }
-                features.push(found.clone());
-            }
+            Found::Rig(index) => features.push(truth.features[index].clone()),
         }
     }
     Ok((Rig { features, ..truth.clone() }, carried))

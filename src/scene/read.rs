@@ -1,16 +1,17 @@
 //! Reading scene files, with a place for every mistake.
 use super::Scene;
+use super::check::{MOVES_NOTHING, carries};
 use super::read_control::read_control;
 use super::read_faults::{read_couplings, read_faults, read_slips};
 use super::read_limits::read_limits;
 use super::read_target::{read_target, read_task};
 use crate::Error;
-use crate::rig::read::document::{Fields, Node, Source, parse};
+use crate::rig::read::document::{Field, Fields, Node, Source, parse};
 use crate::rig::read::noise::read_pose_noise;
 use crate::rig::{Rig, catalog, read::read_text};
-use crate::servo::{LoopSettings, Takes};
+use crate::servo::{LoopSettings, Takes, image_tasks};
 use crate::simulate::world::{Execution, Tracker, WorldOptions};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 impl Scene {
     /// Reads a scene file.
@@ -51,6 +52,10 @@ impl Scene {
             return Err(path
                 .value
                 .error("moves the target of a `task`, and the scene has none; `velocity` moves joints"));
+        }
+        let moved = ["path", "velocity"].into_iter().find_map(|key| target.field(key));
+        if let (Some(false), Some(field)) = (task.as_ref().map(carries), moved) {
+            return Err(field.value.error(MOVES_NOTHING));
         }
         let tracker = section("tracker", &["kind", "sd", "at", "points", "missed", "faults"])?;
         let tracker = tracker.as_ref();
@@ -93,10 +98,24 @@ impl Scene {
                 None => LoopSettings::default(),
             },
             dt: root.optional("dt", Node::positive)?.unwrap_or(1.0),
+            files: [
+                file_beside(root.field("rig"), catalog::ALL, folder),
+                file_beside(root.field("task"), image_tasks::catalog::ALL, folder),
+                file_beside(target.field("path"), &[], folder),
+            ]
+            .into_iter()
+            .flatten()
+            .collect(),
             rig,
         };
         Ok(scene)
     }
+}
+
+/// The file that a key names, where it names one and not what is shipped.
+fn file_beside(field: Option<Field>, shipped: &[(&str, &str)], folder: &Path) -> Option<PathBuf> {
+    let name = field?.value.text().ok()?;
+    (!shipped.iter().any(|(known, _)| *known == name)).then(|| folder.join(name))
 }
 
 /// A shipped rig, or a file beside the scene.

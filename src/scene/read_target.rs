@@ -12,6 +12,9 @@ use std::path::Path;
 
 /// The table `target` of a scene.
 pub(super) fn read_target(fields: &Fields, rig: Option<&Rig>, folder: &Path) -> Result<Target, Error> {
+    if let (Some(until), None) = (fields.field("until"), fields.field("velocity")) {
+        return Err(until.value.error("says for how long `velocity` moves the target, and there is none"));
+    }
     Ok(Target {
         joints: joints(fields, "joints", rig)?,
         velocity: fields.optional("velocity", Node::any_numbers)?.unwrap_or_default(),
@@ -41,6 +44,9 @@ fn read_path(node: &Node, folder: &Path) -> Result<Vec<Waypoint>, Error> {
         };
         poses.iter().map(|(time, pose)| Waypoint { time: time - began, motion: *pose * first.inverse() }).collect()
     };
+    if path.is_empty() {
+        return Err(node.error("has no place: expected at least one [s, m, m, m]"));
+    }
     if path.windows(2).any(|pair| pair[1].time <= pair[0].time)
         || path.iter().any(|waypoint| !waypoint.time.is_finite())
     {

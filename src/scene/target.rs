@@ -1,6 +1,6 @@
 //! Where the arm of a scene shall be, which may move.
+use crate::geometry::between;
 use handeye_solvers::Pose;
-use handeye_solvers::manifold::so3;
 
 /// Where the arm shall be: joints whose pixels are aimed at, or with which a task is solved.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -41,11 +41,6 @@ impl Target {
             (Some(0), _) => return self.path[0].motion,
             (Some(after), _) => (&self.path[after - 1], &self.path[after]),
         };
-        let share = (time - from.time) / (to.time - from.time);
-        let turn = so3::log(&(to.motion.rotation * from.motion.rotation.transpose()));
-        Pose {
-            rotation: so3::exp(&(share * turn)) * from.motion.rotation,
-            translation: from.motion.translation.lerp(&to.motion.translation, share),
-        }
+        between(&from.motion, &to.motion, (time - from.time) / (to.time - from.time))
     }
 }

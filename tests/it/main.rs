@@ -45,6 +45,7 @@ mod states;
 mod suggest;
 mod tables;
 mod targets;
+mod task_scene_files;
 mod task_scenes;
 mod tidy;
 mod uncalibrated;

@@ -58,6 +58,7 @@ fn assert_limits(scene: &Scene, run: &Run) {
 
 #[test]
 fn tasks_are_carried_out_from_anywhere_near_inside_the_limits_of_the_joints() {
+    let mut held = 0;
     for seed in 1..=40 {
         let mut scene = scene(seed, IMAGES);
         // Narrow ones, of which some hold on the way.
@@ -70,8 +71,12 @@ fn tasks_are_carried_out_from_anywhere_near_inside_the_limits_of_the_joints() {
         assert!(run.stop.is_success(), "seed {seed}: {:?}", run.stop);
         assert_limits(&scene, &run);
         let end = run.moments.last().unwrap();
-        assert!(end.error_px.unwrap() < 1.0 && end.error_m < 0.003, "seed {seed}: {:?} {}", end.error_px, end.error_m);
+        held += usize::from(run.moments.iter().any(|moment| !moment.active.is_empty()));
+        // 10 of 16 rows are noise of √2 · 0.3 px that no joint takes up: 0.34 ± 0.07 px, five of these. The other 6 move the hand, by some 0.26 px / 600 px at
+        // 1.2 m in two directions, 0.7 mm; three times that.
+        assert!(end.error_px.unwrap() < 0.7 && end.error_m < 0.002, "seed {seed}: {:?} {}", end.error_px, end.error_m);
     }
+    assert!(held >= 30, "only {held} of 40 runs met a limit");
 }
 
 #[test]
@@ -102,7 +107,8 @@ fn trackers_that_are_lost_midway_leave_a_task_that_is_carried_out_or_a_reason() 
         match run.stop.name() {
             "converged" | "no-better" => {
                 carried_out += 1;
-                assert!(end.error_m < 0.008, "seed {seed}: {:?}, {} m", run.stop, end.error_m);
+                // From half of the rows, or few: the noise of all of them, 0.7 mm, up to five times.
+                assert!(end.error_m < 0.0035, "seed {seed}: {:?}, {} m", run.stop, end.error_m);
             }
             "lost" | "undetermined" => {
                 stopped += 1;
@@ -114,7 +120,8 @@ fn trackers_that_are_lost_midway_leave_a_task_that_is_carried_out_or_a_reason() 
             other => panic!("seed {seed}: {other}"),
         }
     }
-    assert!(carried_out >= 40 && stopped >= 5, "{carried_out} carried out, {stopped} stopped");
+    // All of the three in four that keep half of their trackers, and of the others as many as lost them late enough.
+    assert!(carried_out >= 45 && stopped >= 10, "{carried_out} carried out, {stopped} stopped");
 }
 
 #[test]
@@ -125,7 +132,7 @@ fn a_robot_that_moves_its_tip_is_moved_without_turning_or_by_all_six_coordinates
         turning.takes = Takes::PoseVelocity;
         let run = go(&turning);
         assert!(run.stop.is_success(), "seed {seed}: {:?}", run.stop);
-        assert!(run.moments.last().unwrap().error_m < 0.003, "seed {seed}");
+        assert!(run.moments.last().unwrap().error_m < 0.002, "seed {seed}");
         // Shifted alone at the beginning: what is moved without turning arrives too.
         let mut shifting = scene(seed, IMAGES);
         shifting.takes = Takes::PoseDelta;
@@ -139,7 +146,7 @@ fn a_robot_that_moves_its_tip_is_moved_without_turning_or_by_all_six_coordinates
         }];
         let run = go(&shifting);
         assert!(run.stop.is_success(), "seed {seed}: {:?}", run.stop);
-        assert!(run.moments[0].error_m > 0.08 && run.moments.last().unwrap().error_m < 0.003, "seed {seed}");
+        assert!(run.moments[0].error_m > 0.08 && run.moments.last().unwrap().error_m < 0.002, "seed {seed}");
         for moment in &run.moments {
             let turned = model.tip(&moment.joints).rotation * model.tip(&TARGET).rotation.transpose();
             assert!(so3::log(&turned).norm() < 1e-4, "seed {seed}: turned by {}", so3::log(&turned).norm());
@@ -149,15 +156,19 @@ fn a_robot_that_moves_its_tip_is_moved_without_turning_or_by_all_six_coordinates
 
 #[test]
 fn points_of_a_depth_camera_lead_as_near_as_their_noise_allows() {
+    let mut sum = 0.0;
     for seed in 1..=20 {
         let mut scene = scene(seed, "kind = \"point-to-point-3d\", px_per_metre = 400, cameras = [\"left\"]");
         scene.rig.as_mut().unwrap().cameras[0].depth = true;
         scene.settings.tolerance_px = 1.3 * 400.0 * 0.002 * 2.0_f64.sqrt();
         let run = go(&scene);
         assert!(run.stop.is_success(), "seed {seed}: {:?}", run.stop);
-        // 6 of 12 rows are noise of √2 · 2 mm that moves the arm: a distance of 2 mm over 4 points; three times that.
-        assert!(run.moments.last().unwrap().error_m < 0.006, "seed {seed}: {}", run.moments.last().unwrap().error_m);
+        // 6 of 12 rows are noise of √2 · 2 mm that moves the arm: a distance of 2 √2 √(6/4) = 3.5 mm over 4 points, less what is averaged.
+        let off = run.moments.last().unwrap().error_m;
+        assert!(off < 0.005, "seed {seed}: {off}");
+        sum += off;
     }
+    assert!((0.001..0.003).contains(&(sum / 20.0)), "{} m in the mean", sum / 20.0);
 }
 
 #[test]
@@ -178,10 +189,10 @@ fn a_target_that_is_moved_is_followed_as_far_behind_as_the_gain_has_it_and_met_w
         let run = go(&scene);
         assert_eq!(run.stop.name(), "timed-out", "seed {seed}");
         let off = |step: usize| run.moments[step].error_m;
-        assert!(off(39) < 0.002 && off(99) < 0.002, "seed {seed}: {} {}", off(39), off(99));
-        // The mean of some; with gain λ, 1 / λ motions, of which the noise leaves a third open.
+        assert!(off(39) < 0.001 && off(99) < 0.001, "seed {seed}: {} {}", off(39), off(99));
+        // The mean of some; with gain λ, 1 / λ motions, of which the noise and a Jacobian that is learned leave a fifth open.
         let lag = (55..70).map(off).sum::<f64>() / 15.0 / per_command;
-        assert!((1.3..2.7).contains(&lag), "seed {seed}: {lag} motions behind");
+        assert!((1.6..2.4).contains(&lag), "seed {seed}: {lag} motions behind");
     }
 }
 
@@ -249,7 +260,8 @@ fn cameras_on_the_hand_bring_what_is_fixed_in_their_images_to_an_object() {
         let model = Model::new(&rig).unwrap();
         let object = model.tip(&TARGET).transform(&gripper.into());
         let off = (model.tip(&joints).transform(&gripper.into()) - object).norm();
-        assert!(off < 0.002, "seed {seed}: {off} m");
+        // √2 · 0.3 px in four rows of three coordinates, 600 px at 0.35 m: 0.25 mm along, and as far as that in depth.
+        assert!(off < 0.001, "seed {seed}: {off} m");
     }
 }
 
@@ -268,7 +280,7 @@ fn a_dead_band_that_a_scene_tells_of_leaves_what_one_allows() {
         let Some(Control::Uncalibrated(control)) = &told.control else { panic!("{:?}", told.control) };
         assert_eq!((control.dead_band, control.settings.gain), (0.002, 0.25));
         let end = off(go(&told).moments.last().unwrap());
-        assert!(end <= 1.5 * 0.002, "seed {seed}: {end}");
+        assert!(end <= 0.002, "seed {seed}: {end}");
         // Who is not told, and keeps the Jacobian, stays about four of them away.
         let mut untold = told.clone();
         let settings = Settings { gain: 0.25, trust: None, ..Settings::plain(0.25, 0.1) };
@@ -278,7 +290,7 @@ fn a_dead_band_that_a_scene_tells_of_leaves_what_one_allows() {
             ..UncalibratedControl::default()
         }));
         let end = off(go(&untold).moments.last().unwrap());
-        assert!(end > 2.0 * 0.002, "seed {seed}: {end}");
+        assert!((2.5 * 0.002..6.0 * 0.002).contains(&end), "seed {seed}: {end}");
     }
 }
 
@@ -296,7 +308,7 @@ fn slips_couplings_and_noise_by_distance_are_read_from_scenes_and_servoed_throug
         scene.settings.tolerance_px = 0.7;
         let run = go(&scene);
         assert!(run.stop.is_success(), "seed {seed}: {:?}", run.stop);
-        assert!(run.moments.last().unwrap().error_m < 0.004, "seed {seed}: {}", run.moments.last().unwrap().error_m);
+        assert!(run.moments.last().unwrap().error_m < 0.003, "seed {seed}: {}", run.moments.last().unwrap().error_m);
     }
 }
 
@@ -332,81 +344,4 @@ fn nothing_moves_where_joints_that_were_read_are_no_numbers_and_a_robot_without_
     assert!(decide(&scene.start).is_ok());
     let refused = decide(&[]).unwrap_err();
     assert!(refused.to_string().contains("the joints are not read"), "{refused}");
-}
-
-#[test]
-fn what_is_wrong_with_a_scene_of_a_task_is_said_with_its_place() {
-    let folder = Folder::new("task-scene-mistakes");
-    let head = "rig = \"ur5\"\n";
-    let rest = format!("[robot]\nstart = {TARGET:?}\n[target]\njoints = {TARGET:?}\n");
-    let cases = [
-        (
-            format!("{head}task = \"wrenches\"\n{rest}"),
-            "scene.toml:2:8: `task`: `wrenches` is no task file beside the scene",
-        ),
-        (
-            format!("{head}{rest}path = [[0, 0, 0, 0]]\n"),
-            "scene.toml:6:8: target: `path`: moves the target of a `task`, and the scene has none",
-        ),
-        (
-            format!("{head}task = \"wrench\"\n{rest}path = [[1, 0, 0, 0], [1, 0, 0, 0]]\n"),
-            "target: `path`: has times that do not ascend",
-        ),
-        (format!("{head}task = \"wrench\"\n{rest}path = [[1, 0, 0]]\n"), "expected 4 numbers, found 3"),
-        (format!("{head}task = \"wrench\"\n{rest}path = \"nowhere.jsonl\"\n"), "target: `path`: "),
-        (
-            format!("{head}task = \"wrench\"\n{rest}[controller]\nkind = \"model-based\"\n"),
-            "scene.toml:7:2: controller: a task is carried out by `kind = \"uncalibrated\"`, this is model-based",
-        ),
-        (
-            format!("{head}task = \"wrench\"\n{rest}[controller]\npixels = 1\n"),
-            "scene.toml:8:10: controller: `pixels`: is `noise = { pixels = ... }` of the task",
-        ),
-        (
-            format!("{head}task = \"wrench\"\n{rest}[limits]\ntip_speed = 1\n"),
-            "limit `tip_speed` needs a rig, and a task is carried out without one",
-        ),
-        (format!("{head}{rest}[task]\ncameras = [\"left\"]\n"), "`task`: has no [[tasks]]"),
-        (
-            format!(
-                "{head}{rest}[task]\ncameras = [\"top\"]\nfeatures = [{{ name = \"f0\", on = \"hand\" }}, {{ name = \"p\", on = \"target\", xyz = [0,0,0] }}]\ntasks = [{{ kind = \"point-to-point\", point = \"f0\", to = \"p\" }}]\n"
-            ),
-            "camera `top` of the scene's task is not one of its rig (known: left, right)",
-        ),
-        (
-            format!(
-                "{head}{rest}[task]\ncameras = [\"left\"]\nfeatures = [{{ name = \"q\", on = \"hand\" }}, {{ name = \"p\", on = \"target\", xyz = [0,0,0] }}]\ntasks = [{{ kind = \"point-to-point\", point = \"q\", to = \"p\" }}]\n"
-            ),
-            "feature `q` on hand is not in the scene's rig: give its `xyz` in the task",
-        ),
-        (
-            format!(
-                "{head}{rest}[task]\ncameras = [\"left\"]\nfeatures = [{{ name = \"f0\", on = \"target\" }}, {{ name = \"p\", on = \"hand\", xyz = [0,0,0] }}]\ntasks = [{{ kind = \"point-to-point\", point = \"p\", to = \"f0\" }}]\n"
-            ),
-            "feature `f0` is on target in the task, and not so in the rig",
-        ),
-        (
-            format!("{head}[tracker]\nat = 1\n{rest}"),
-            "scene.toml:2:2: tracker: has `at` (m), the distance of its `sd`, and no `sd` (px)",
-        ),
-        (format!("{head}[tracker]\nkind = \"rounded\"\nat = 1\n{rest}"), "is rounded, and `at` is for gaussian ones"),
-        (
-            rest.replace("[target]", "slips = [{ joint = \"knee\", by = 0.1 }]\n[target]"),
-            "names joint `knee`, which its rig has not",
-        ),
-        (rest.replace("[target]", "slips = [{ joint = \"elbow\" }]\n[target]"), "slips: has no `by`"),
-        (
-            format!("{rest}[controller]\ndead_band = 0.1\n"),
-            "`dead_band` (of the robot's joints) is for uncalibrated and hybrid, this is model-based",
-        ),
-    ];
-    for (text, message) in cases {
-        folder.write("scene.toml", &text);
-        let (_, complaint) = folder.expect(2, "servo ur5 scene.toml");
-        assert!(complaint.contains(message), "{text}\n{complaint}\n{message}");
-    }
-    // Three rows for six joints: said before anything moves.
-    folder.write("scene.toml", &format!("{head}{rest}[task]\ncameras = [\"left\"]\nfeatures = [{{ name = \"f0\", on = \"hand\" }}, {{ name = \"p\", on = \"target\", xyz = [0,0,0] }}]\ntasks = [{{ kind = \"point-to-point\", point = \"f0\", to = \"p\" }}]\n"));
-    let (_, complaint) = folder.expect(2, "servo scene.toml");
-    assert!(complaint.contains('6') && complaint.contains('2'), "{complaint}");
 }

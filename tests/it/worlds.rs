@@ -2,7 +2,7 @@
 use handeye::rig::{Camera, Feature, Model, Parent, Rig, catalog};
 use handeye::servo::Command;
 use handeye::simulate::world::{
-    Coupling, Drone, Execution, Object, Slip, Spring, SpringArm, Table, Tracker, World, WorldOptions,
+    Coupling, Drone, Execution, Fault, FaultKind, Object, Slip, Spring, SpringArm, Table, Tracker, World, WorldOptions,
 };
 use handeye::solvers::Pose;
 use handeye::solvers::nalgebra::{Matrix3, Rotation3, Vector3};
@@ -79,8 +79,18 @@ fn a_joint_that_slips_is_seen_and_not_read_and_commands_miss_by_it_from_then_on(
         assert!(read.iter().zip(&goal).all(|(read, goal)| (read - goal).abs() < 1e-12), "{step}: {read:?}");
         assert_eq!(world.look().pixels, world.exact(world.joints()));
     }
-    let strange = vec![Slip { joint: 6, by: 0.05, at: 0.0 }];
-    assert!(World::new(&rig, &START, WorldOptions { slips: strange, ..WorldOptions::default() }).is_err());
+    let good = Slip { joint: 2, by: 0.05, at: 0.0 };
+    let with = |slip: Slip| World::new(&rig, &START, WorldOptions { slips: vec![slip], ..WorldOptions::default() });
+    assert!(with(good).is_ok());
+    for strange in [
+        Slip { joint: 6, ..good },
+        Slip { by: f64::INFINITY, ..good },
+        Slip { at: f64::NAN, ..good },
+        Slip { at: f64::INFINITY, ..good },
+        Slip { at: -1.0, ..good },
+    ] {
+        assert!(with(strange).is_err(), "{strange:?}");
+    }
 }
 
 #[test]
@@ -93,6 +103,19 @@ fn a_joint_that_another_drags_along_moves_by_its_share() {
     let moved: Vec<f64> = world.joints().iter().zip(START).map(|(now, before)| now - before).collect();
     let expected = [0.0, 0.1, 0.0, 0.3, 0.05 - 0.2 * 0.3, 0.0];
     assert!(moved.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{moved:?}");
+    // A joint at the end of its limits does not move, and drags nothing along; who is dragged along stops at its own end.
+    let mut narrow = rig.clone();
+    narrow.robot.joints[3].limits.upper = Some(START[3] + 0.1);
+    narrow.robot.joints[4].limits.lower = Some(START[4] - 0.05);
+    let execution = Execution { couplings: vec![Coupling { joint: 4, by: 3, share: -0.2 }], ..Execution::default() };
+    let mut world = World::new(&narrow, &START, WorldOptions { execution, ..WorldOptions::default() }).unwrap();
+    for (motion, expected) in [(0.3, [0.1, -0.02]), (0.3, [0.1, -0.02]), (-0.1, [0.0, 0.0]), (0.05, [0.05, -0.01])] {
+        world.execute(&Command::JointDelta(vec![0.0, 0.0, 0.0, motion, 0.0, 0.0]), 1.0).unwrap();
+        let moved = [3, 4].map(|joint| world.joints()[joint] - START[joint]);
+        assert!(moved.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{motion}: {moved:?}");
+    }
+    world.execute(&Command::JointDelta(vec![0.0, 0.0, 0.0, 0.05, -1.0, 0.0]), 1.0).unwrap();
+    assert!((world.joints()[4] - (START[4] - 0.05)).abs() < 1e-12, "{}", world.joints()[4]);
     let strange = Execution { couplings: vec![Coupling { joint: 6, by: 3, share: 0.1 }], ..Execution::default() };
     assert!(World::new(&rig, &START, WorldOptions { execution: strange, ..WorldOptions::default() }).is_err());
 }
@@ -125,6 +148,84 @@ fn a_thing_that_is_carried_is_seen_where_it_is_or_was_with_latency_and_a_held_on
     }
 }
 
+#[test]
+fn what_is_seen_with_latency_is_the_thing_where_it_was_on_its_way_then() {
+    let rig = catalog::rig("ur5").unwrap();
+    let model = Model::new(&rig).unwrap();
+    let here = model.tip(&START);
+    // Carried evenly, and turned by 0.2 rad per second.
+    let at = |time: f64| {
+        let turned = Pose::new(Vector3::new(0.0, 0.0, 0.2 * time), Vector3::zeros()).rotation * here.rotation;
+        Pose { rotation: turned, translation: here.translation + Vector3::new(0.03, -0.02, 0.01) * time }
+    };
+    let free = World::new(&rig, &START, WorldOptions::default()).unwrap();
+    for latency in [0.0, 0.3, 0.5, 1.0, 1.7] {
+        let mut world = World::new(&rig, &START, WorldOptions { latency, ..WorldOptions::default() }).unwrap();
+        let thing = world.put(Object::new((0..rig.features.len()).collect(), here));
+        for second in 0..5 {
+            world.carry(thing, at(f64::from(second)));
+            let sample = world.look();
+            let then = (f64::from(second) - latency).max(0.0);
+            assert_eq!(sample.time, Some(then));
+            let expected = free.exact_with_tip(&at(then));
+            assert_eq!(sample.pixels.len(), expected.len());
+            for (seen, expected) in sample.pixels.iter().zip(&expected) {
+                let off = (seen.pixel[0] - expected.pixel[0]).hypot(seen.pixel[1] - expected.pixel[1]);
+                assert!(off < 1e-6, "{latency} s old at {second} s: {off} px from where it was");
+            }
+            world.execute(&Command::Hold, 1.0).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_tracker_that_fails_says_the_same_of_a_point_in_space_as_of_its_pixel() {
+    let rig = near_and_far(true);
+    let of = |kind: FaultKind| {
+        let fault = Fault { camera: 0, feature: 1, kind, from: 1.0, until: 3.0 };
+        let options = WorldOptions { points: 0.004, faults: vec![fault], ..WorldOptions::default() };
+        let mut world = World::new(&rig, &START, options).unwrap();
+        let far = world.header().features.iter().position(|known| known == "far").unwrap() as u32;
+        let mut looks = Vec::new();
+        for _ in 0..4 {
+            let sample = world.look();
+            let pixel = sample.pixels.iter().find(|seen| seen.feature == far).map(|seen| seen.pixel);
+            let point = sample.points.iter().find(|seen| seen.feature == far).map(|seen| Vector3::from(seen.point));
+            looks.push((pixel, point));
+            world.execute(&Command::Hold, 1.0).unwrap();
+        }
+        looks
+    };
+    let is_near = |point: Option<Vector3<f64>>, place: Vector3<f64>| (point.unwrap() - place).norm() < 6.0 * 0.004;
+    let place = Vector3::new(-0.1, -0.2, 3.0);
+    let focal = rig.cameras[0].fx.unwrap();
+    let lost = of(FaultKind::Lost);
+    assert!(lost[1] == (None, None) && lost[2] == (None, None) && is_near(lost[3].1, place), "{lost:?}");
+    let frozen = of(FaultKind::Frozen);
+    assert!(frozen[1] == frozen[0] && frozen[2] == frozen[0] && frozen[3].1 != frozen[0].1, "{frozen:?}");
+    // 60 px to the right, at the same distance from the camera.
+    for (kind, by) in [(FaultKind::Jumped([60.0, 0.0]), [60.0, 60.0]), (FaultKind::Drifting([60.0, 0.0]), [0.0, 60.0])]
+    {
+        let looks = of(kind);
+        for (look, by) in looks[1..3].iter().zip(by) {
+            let ray = Vector3::new(place.x / place.z + by / focal, place.y / place.z, 1.0).normalize();
+            assert!(is_near(look.1, place.norm() * ray), "{kind:?}: {look:?}");
+        }
+        assert!(is_near(looks[0].1, place) && is_near(looks[3].1, place), "{looks:?}");
+    }
+    let with = |fault: Fault| World::new(&rig, &START, WorldOptions { faults: vec![fault], ..WorldOptions::default() });
+    let good = Fault { camera: 0, feature: 1, kind: FaultKind::Lost, from: 0.0, until: f64::INFINITY };
+    assert!(with(good.clone()).is_ok());
+    for strange in [
+        Fault { camera: 1, ..good.clone() },
+        Fault { feature: 2, ..good.clone() },
+        Fault { from: f64::NAN, ..good.clone() },
+        Fault { kind: FaultKind::Jumped([f64::NAN, 0.0]), ..good },
+    ] {
+        assert!(with(strange.clone()).is_err(), "{strange:?}");
+    }
+}
+
 /// A WAM with its tool 0.385 m before the last joint, and where that is.
 fn wam(joints: &[f64; 4]) -> (Rig, Vector3<f64>) {
     let mut rig = catalog::rig("wam4").unwrap();
@@ -140,20 +241,20 @@ fn a_spring_pulls_the_tip_to_its_centre_and_presses_it_on_a_table_as_statics_has
     let free = Spring { stiffness: [200.0, 300.0, 400.0], damping: 2.0, table: None };
     let mut arm = SpringArm::new(&rig, &JOINTS, free).unwrap();
     let centre = tool + Vector3::new(0.05, -0.04, 0.03);
-    arm.pull(&tool, &centre, 1.0);
-    arm.pull(&centre, &centre, 5.0);
+    arm.pull(&tool, &centre, 1.0).unwrap();
+    arm.pull(&centre, &centre, 5.0).unwrap();
     assert!((arm.tip().translation - centre).norm() < 1e-4, "{}", arm.tip().translation - centre);
     assert_eq!(arm.contact(), 0.0);
     for friction in [0.0, 0.05, 0.2] {
         let table = Table { height: tool.z, stiffness: 1e5, friction };
         let mut arm = SpringArm::new(&rig, &JOINTS, Spring { table: Some(table), ..free }).unwrap();
         let below = tool - 0.1 * Vector3::z();
-        arm.pull(&tool, &below, 1.0);
+        arm.pull(&tool, &below, 1.0).unwrap();
         let mut centre = below;
         for way in [Vector3::new(0.06, 0.0, 0.0), Vector3::new(0.0, 0.05, 0.0), Vector3::new(-0.03, -0.02, 0.0)] {
-            arm.pull(&centre, &(centre + way), 1.0);
+            arm.pull(&centre, &(centre + way), 1.0).unwrap();
             centre += way;
-            arm.pull(&centre, &centre, 10.0);
+            arm.pull(&centre, &centre, 10.0).unwrap();
             let stretched = centre - arm.tip().translation;
             let normal = 400.0 * -stretched.z;
             assert!((arm.contact() / normal - 1.0).abs() < 0.01, "{} N, by statics {normal}", arm.contact());
@@ -165,6 +266,27 @@ fn a_spring_pulls_the_tip_to_its_centre_and_presses_it_on_a_table_as_statics_has
     }
     let soft = Spring { damping: 0.0, ..free };
     assert!(SpringArm::new(&rig, &JOINTS, soft).is_err());
+}
+
+#[test]
+fn a_spring_whose_centre_or_time_is_no_number_is_refused_and_nothing_moves() {
+    const JOINTS: [f64; 4] = [0.0, 1.0, 0.0, 1.8];
+    let (rig, tool) = wam(&JOINTS);
+    let spring = Spring { stiffness: [200.0; 3], damping: 2.0, table: None };
+    let mut arm = SpringArm::new(&rig, &JOINTS, spring).unwrap();
+    let there = tool + Vector3::new(0.05, 0.0, 0.0);
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1.0] {
+        assert!(arm.pull(&tool, &there, bad).is_err(), "{bad} s");
+        if bad != -1.0 {
+            let nowhere = Vector3::new(tool.x, bad, tool.z);
+            assert!(arm.pull(&nowhere, &there, 1.0).is_err() && arm.pull(&tool, &nowhere, 1.0).is_err(), "{bad} m");
+        }
+    }
+    let far = Vector3::new(1e308, 1e308, -1e308);
+    assert!(arm.pull(&far, &-far, 1.0).is_err(), "{:?}", arm.joints());
+    assert_eq!((arm.joints(), arm.tip().translation), (&JOINTS[..], tool));
+    arm.pull(&tool, &there, 1.0).unwrap();
+    assert!((arm.tip().translation - tool).norm() > 0.01);
 }
 
 #[test]

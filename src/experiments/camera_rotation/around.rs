@@ -3,6 +3,7 @@ use super::run::{ITERATIONS, Run, carried_around};
 use super::tables::STRIDE;
 use super::world::{Scene, Tracker};
 use crate::Error;
+use crate::experiments::setting::trials;
 use crate::experiments::{Experiment, Options, Outcome, Row};
 use crate::servo::uncalibrated::Settings;
 
@@ -27,23 +28,22 @@ pub(in crate::experiments) const FIGURE5_9: Experiment = Experiment {
 /// Places around the target.
 const PLACES: usize = 36;
 
+/// Of a run that never arrives.
+const ALL_STEPS: usize = ITERATIONS.div_ceil(STRIDE);
+
 /// λ, of the figures' captions.
 const GAIN: f64 = 0.5;
 
 fn run(options: &Options, tracker: Tracker, size_deg: f64) -> Result<Outcome, Error> {
     let settings = Settings::plain(GAIN, size_deg.to_radians());
-    let mut trials: Vec<Vec<Run>> = Vec::new();
-    for trial in 0..options.trials {
-        let seed = options.seed.wrapping_mul(1000).wrapping_add(trial as u64);
-        let scene = if trial == 0 { Scene::RECONSTRUCTED } else { Scene::drawn(seed)? };
-        trials.push(carried_around(&scene, tracker, &settings, PLACES, seed)?);
-    }
+    let trials: Vec<Vec<Run>> =
+        trials(options, |seed| carried_around(&Scene::of_trial(seed, options)?, tracker, &settings, PLACES, seed))?;
     type Figure = fn(&Run) -> Option<f64>;
     let figures: [(&str, Figure); 4] = [
         ("image error [px]", |run| run.errors.last().copied()),
         ("3D error [m]", |run| Some(run.error_3d)),
         ("condition number", |run| run.condition),
-        ("steps to 10 px", |run| Some(run.steps(STRIDE).unwrap_or(ITERATIONS.div_ceil(STRIDE)) as f64)),
+        ("steps to 10 px", |run| Some(run.steps(STRIDE).unwrap_or(ALL_STEPS) as f64)),
     ];
     let mut rows = Vec::new();
     for (panel, figure) in figures {
@@ -57,7 +57,10 @@ fn run(options: &Options, tracker: Tracker, size_deg: f64) -> Result<Outcome, Er
             }
         }
     }
-    let diverged = trials.iter().flatten().filter(|run| run.diverged()).count();
+    let count = |is_it: &dyn Fn(&Run) -> bool| trials.iter().flatten().filter(|run| is_it(run)).count();
+    let (all, diverged) = (count(&|_| true), count(&Run::diverged));
+    let stopped = count(&|run| run.stop.is_some() && !run.diverged());
+    let late = count(&|run| !run.diverged() && run.steps(STRIDE).is_none());
     Ok(Outcome {
         setting: format!(
             "Puma 560, 3 points seen by 2 cameras 1 m away and 0.3 m apart; exploratory motions of {size_deg} degrees, gain {GAIN}, the Jacobian \
@@ -67,7 +70,13 @@ fn run(options: &Options, tracker: Tracker, size_deg: f64) -> Result<Outcome, Er
         abscissa: Some("angle of the cameras [degrees]"),
         rows,
         notes: vec![
-            format!("{diverged} of {} diverged, and are left out", PLACES * trials.len()),
+            format!(
+                "{diverged} of {all} diverged, and are left out; {stopped} were stopped for another reason, and count as they ended"
+            ),
+            format!(
+                "{late} of the {} others were not within 10 px at any of their steps, and count as {ALL_STEPS}",
+                all - diverged
+            ),
             "published as curves without numbers; in words: the higher the condition number, the longer it takes"
                 .to_owned(),
         ],

@@ -1,10 +1,10 @@
 //! Figure 5.10: one of the two cameras is carried around the target, and with it the angle between both.
-use super::run::{ITERATIONS, Run, serve};
+use super::run::{ITERATIONS, Run, servo};
 use super::world::{Scene, Tracker, View, World};
 use crate::Error;
+use crate::experiments::setting::trials;
 use crate::experiments::{Experiment, Options, Outcome, Row};
 use crate::servo::uncalibrated::{Settings, Stop};
-use rayon::prelude::*;
 
 pub(in crate::experiments) const FIGURE5_10: Experiment = Experiment {
     name: "figure5.10",
@@ -25,14 +25,10 @@ const GAIN: f64 = 0.5;
 
 fn run(options: &Options) -> Result<Outcome, Error> {
     let angles: Vec<usize> = (0..360).step_by(STRIDE).collect();
-    let trials: Vec<Vec<Run>> = (0..options.trials)
-        .into_par_iter()
-        .map(|trial| {
-            let seed = options.seed.wrapping_mul(1000).wrapping_add(trial as u64);
-            let scene = if trial == 0 { Scene::RECONSTRUCTED } else { Scene::drawn(seed)? };
-            angles.iter().map(|angle| between(&scene, (*angle as f64).to_radians())).collect()
-        })
-        .collect::<Result<_, Error>>()?;
+    let trials: Vec<Vec<Run>> = trials(options, |seed| {
+        let scene = Scene::of_trial(seed, options)?;
+        angles.iter().map(|angle| between(&scene, (*angle as f64).to_radians())).collect()
+    })?;
     let mut rows = Vec::new();
     for (series, figure) in [
         ("condition number", (|run: &Run| run.condition) as fn(&Run) -> Option<f64>),
@@ -49,8 +45,9 @@ fn run(options: &Options) -> Result<Outcome, Error> {
     let refused = trials.iter().filter(|runs| matches!(runs[0].stop, Some(Stop::Undetermined(_)))).count();
     Ok(Outcome {
         setting: format!(
-            "Puma 560, 3 points seen by 2 cameras 1 m away, perfect trackers; exploratory motions of 8 degrees, gain {GAIN}, the Jacobian kept; \
-             a trial is a scene, the first one reconstructed"
+            "Puma 560, 3 points seen by 2 cameras 1 m away, perfect trackers; exploratory motions of {:.0} degrees, gain {GAIN}, the Jacobian kept; \
+             a trial is a scene, the first one reconstructed",
+            SIZE.to_degrees()
         ),
         measure: "condition number of the Jacobian, iterations",
         abscissa: Some("angle between the cameras [degrees]"),
@@ -73,5 +70,5 @@ fn iterations(run: &Run) -> Option<f64> {
 /// One camera in front of the target, the other at an angle to it [rad].
 fn between(scene: &Scene, angle: f64) -> Result<Run, Error> {
     let views = [0.0, angle].map(|angle| View { angle, beside: 0.0, distance: 1.0 });
-    serve(&mut World::new(scene, &views, Tracker::Perfect, 1)?, &Settings::plain(GAIN, SIZE))
+    servo(&mut World::new(scene, &views, Tracker::Perfect, 1)?, &Settings::plain(GAIN, SIZE))
 }

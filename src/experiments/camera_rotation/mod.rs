@@ -7,7 +7,7 @@ mod run;
 mod tables;
 mod world;
 
-pub use run::{Run, carried_around, serve};
+pub use run::{ITERATIONS, Run, carried_around, servo};
 pub use world::{Scene, Tracker, View, World};
 
 pub(super) use around::{FIGURE5_8, FIGURE5_9};

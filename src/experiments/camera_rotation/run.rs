@@ -1,7 +1,7 @@
 //! One servo run in the scene, and runs around the target.
 use super::world::{Scene, Tracker, View, World};
 use crate::Error;
-use crate::experiments::without_rig::controlled::{self, Course};
+use crate::experiments::controlled::{self, Convergence};
 use crate::servo::uncalibrated::{Settings, Stop};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -20,7 +20,7 @@ pub struct Run {
 }
 
 /// Iterations of a run.
-pub(super) const ITERATIONS: usize = 50;
+pub const ITERATIONS: usize = 50;
 
 /// The error below which the thesis counts steps [px].
 const NEAR: f64 = 10.0;
@@ -37,17 +37,17 @@ impl Run {
     }
 }
 
-/// Servoes from the start, 50 iterations after exploring.
+/// Servoes from the start, [`ITERATIONS`] times after exploring unless it is stopped before; those that explore again are some of them.
 ///
-/// Errors: what [`Uncalibrated::new`] refuses.
-pub fn serve(world: &mut World, settings: &Settings) -> Result<Run, Error> {
-    let Course { errors, condition, stop } = controlled::serve(world, settings, ITERATIONS, &mut |_, _| ())?;
+/// Errors: what [`crate::servo::uncalibrated::Uncalibrated::new`] refuses.
+pub fn servo(world: &mut World, settings: &Settings) -> Result<Run, Error> {
+    let Convergence { errors, condition, stop } = controlled::servo(world, settings, ITERATIONS, &mut |_, _| ())?;
     Ok(Run { errors, error_3d: world.error_3d(), condition, stop })
 }
 
-/// Runs with a pair of cameras at as many places around the target, evenly.
+/// Runs with a pair of cameras at `placements` places around the target, evenly.
 ///
-/// Errors: as [`serve`].
+/// Errors: as [`servo`].
 pub fn carried_around(
     scene: &Scene,
     tracker: Tracker,
@@ -58,7 +58,7 @@ pub fn carried_around(
     let place = |index: usize| {
         let angle = TAU * index as f64 / placements as f64;
         let seed = seed.wrapping_mul(1_000_000).wrapping_add(index as u64);
-        serve(&mut World::new(scene, &View::pair(angle), tracker, seed)?, settings)
+        servo(&mut World::new(scene, &View::pair(angle), tracker, seed)?, settings)
     };
     let runs: Vec<Result<Run, Error>> = (0..placements).into_par_iter().map(place).collect();
     runs.into_iter().collect()

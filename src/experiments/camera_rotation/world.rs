@@ -1,6 +1,8 @@
 //! The scene: an arm, two cameras at a target, and trackers.
 use crate::Error;
-use crate::experiments::without_rig::controlled::Controlled;
+use crate::experiments::Options;
+use crate::experiments::controlled::Controlled;
+use crate::experiments::setting::first_seed;
 use crate::rig::{Camera, Feature, Parent, Rig, catalog};
 use crate::servo::uncalibrated::{Quantity, Row};
 use crate::servo::{Arm, Configuration};
@@ -67,6 +69,13 @@ impl Scene {
         start: [0.5360, 2.0173, 2.9420, 0.2724, 0.5988, -0.4495],
         target: [0.6245, 2.7478, 2.1798, 0.2600, 1.0457, -0.8363],
     };
+
+    /// That of a trial: the reconstructed one in the first, others drawn.
+    ///
+    /// Errors: none with the shipped arm.
+    pub(super) fn of_trial(seed: u64, options: &Options) -> Result<Scene, Error> {
+        if seed == first_seed(options) { Ok(Scene::RECONSTRUCTED) } else { Scene::drawn(seed) }
+    }
 
     /// Another start and target, as far apart, on whose way the arm is nowhere near a singularity.
     ///
@@ -172,11 +181,10 @@ impl View {
 
     /// `world_from_camera`, of a target in the world [m].
     pub fn pose(&self, target: &Vector3<f64>) -> Pose {
-        let ahead = Vector3::new(self.angle.cos(), self.angle.sin(), 0.0);
-        let down = -Vector3::z();
-        let right = down.cross(&ahead);
+        let (sin, cos) = self.angle.sin_cos();
+        let [ahead, right] = [Vector3::new(cos, sin, 0.0), Vector3::new(sin, -cos, 0.0)];
         let translation = target - self.distance * ahead + self.beside * right;
-        Pose { translation, rotation: Matrix3::from_columns(&[right, down, ahead]) }
+        Pose { translation, rotation: Matrix3::from_columns(&[right, -Vector3::z(), ahead]) }
     }
 }
 
@@ -261,8 +269,9 @@ impl Controlled for World {
         World::errors(self)
     }
 
-    fn carry_out(&mut self, motion: &[f64]) {
+    fn carry_out(&mut self, motion: &[f64]) -> Result<(), Error> {
         let there: Vec<f64> = self.joints().iter().zip(motion).map(|(joint, motion)| joint + motion).collect();
         self.move_to(&there);
+        Ok(())
     }
 }

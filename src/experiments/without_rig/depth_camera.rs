@@ -1,5 +1,5 @@
 //! A depth camera: points of the hand are brought onto points of a target in space.
-use super::scenes::{against_command, ends, go, near, pairs, scene};
+use super::scenes::{UR5_POINTS, UR5_TARGET, against_command, ends, go, near, pairs, scene};
 use crate::Error;
 use crate::experiments::setting::trials;
 use crate::experiments::{Experiment, Options, Outcome};
@@ -20,11 +20,7 @@ pub(in crate::experiments) const DEPTH_CAMERA: Experiment = Experiment {
 /// Standard deviations of the camera's points [m], by series.
 const NOISE: [(&str, f64); 4] = [("exact", 0.0), ("1 mm", 1e-3), ("3 mm", 3e-3), ("6 mm", 6e-3)];
 
-/// Points of the hand in the tip's frame [m].
-const POINTS: [[f64; 3]; 4] = [[0.08, 0.0, 0.05], [-0.06, 0.06, 0.06], [-0.05, -0.07, 0.08], [0.0, 0.02, 0.15]];
-
-/// Where the joints shall be, and how far from there they begin [rad].
-const TARGET: [f64; 6] = [0.0, -1.3, 1.2, -1.5, -1.6, 0.3];
+/// How far the joints begin from where they shall be [rad].
 const AWAY: f64 = 0.2;
 
 /// The camera's focal length over its distance from the target [px/m]: errors in pixels are as in its image.
@@ -40,7 +36,7 @@ fn run(options: &Options) -> Result<Outcome, Error> {
         let runs: Vec<Run> = results.iter().map(|runs| runs[index].clone()).collect();
         rows.extend(against_command("error of the rows [px]", series, &runs, SHOWN, |moment| moment.error_px));
         rows.extend(against_command("3D error [mm]", series, &runs, SHOWN, |moment| Some(1e3 * moment.error_m)));
-        let once = 1e3 * noise * (2.0 * 6.0 / POINTS.len() as f64 / 3.0).sqrt();
+        let once = 1e3 * noise * (2.0 * 6.0 / UR5_POINTS.len() as f64 / 3.0).sqrt();
         notes.push(format!("{series}: {}; one look at all points alone leaves some {once:.1} mm", ends(&runs)));
     }
     notes.push(
@@ -51,7 +47,7 @@ fn run(options: &Options) -> Result<Outcome, Error> {
         setting: format!(
             "UR5, {} points of the hand and as many of the target, one depth camera, noise of its points along each axis; our defaults; a trial \
              is a start",
-            POINTS.len()
+            UR5_POINTS.len()
         ),
         measure: "root mean square of the rows [px], mean distance of the hand's points from the target's [mm]",
         abscissa: Some("commands, those of exploring included"),
@@ -65,18 +61,18 @@ fn trial(seed: u64) -> Result<Vec<Run>, Error> {
     rig.cameras.truncate(1);
     rig.cameras[0].depth = true;
     let name = rig.cameras[0].name.clone();
-    let (features, pairs) = pairs(&POINTS);
+    let (features, pairs) = pairs(&UR5_POINTS);
     let part = |[point, to]: [usize; 2]| Part {
         kind: Kind::PointToPoint3d(PointToPoint3d { point, to, px_per_metre: PX_PER_METRE }),
         cameras: vec![0],
     };
     let parts: Vec<Part> = pairs.into_iter().map(part).collect();
-    let start = near(&TARGET, AWAY, seed);
+    let start = near(&UR5_TARGET, AWAY, seed);
     let mut runs = Vec::new();
     for (_, points) in NOISE {
         let trackers = Trackers { points, ..Trackers::default() };
         let task = ImageTask::new(None, vec![name.clone()], features.clone(), parts.clone(), trackers)?;
-        let mut scene = scene(rig.clone(), task, start.clone(), TARGET.to_vec(), seed);
+        let mut scene = scene(rig.clone(), task, start.clone(), UR5_TARGET.to_vec(), seed);
         scene.world.points = points;
         scene.settings.tolerance_px = f64::max(0.1, 1.2 * 2.0_f64.sqrt() * PX_PER_METRE * points);
         scene.settings.window = 30;

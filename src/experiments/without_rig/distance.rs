@@ -55,8 +55,8 @@ const IMAGE: [u32; 2] = [16000, 16000];
 
 fn run(options: &Options) -> Result<Outcome, Error> {
     let results = trials(options, trial)?;
-    let columns = columns(&results);
-    let (errors, stops) = columns.split_at(2 * VIEWS.len() * TRACKERS.len() * DISTANCES.len());
+    let (errors, stops): (Vec<_>, Vec<_>) = results.into_iter().unzip();
+    let errors = columns(&errors);
     let mut figures = errors.iter();
     let mut rows = Vec::new();
     for (panel, of_images) in PANELS {
@@ -78,42 +78,64 @@ fn run(options: &Options) -> Result<Outcome, Error> {
         let label = format!("{}, 3D error at 0.55 m over that at 0.4 m", TRACKERS[series].0);
         rows.push(Row::new(label, published, &ratio));
     }
-    let words = |index: usize, reason: f64| {
-        let times = stops[index].iter().flatten().filter(|stop| **stop == reason).count();
+    let words = |index: usize, reason: Ended| {
+        let times = stops.iter().filter(|stops| stops[index] == reason).count();
         let (view, rest) = (index / (TRACKERS.len() * DISTANCES.len()), index % (TRACKERS.len() * DISTANCES.len()));
         let (tracker, distance) = (TRACKERS[rest / DISTANCES.len()].0, DISTANCES[rest % DISTANCES.len()]);
         let words = format!("{times} of {} with {tracker} at {distance} m ({})", options.trials, VIEWS[view]);
         (times > 0).then_some(words)
     };
-    let all = |reason: f64| {
-        let bad: Vec<String> = (0..stops.len()).filter_map(|index| words(index, reason)).collect();
+    let all = |reason: Ended| {
+        let cases = VIEWS.len() * TRACKERS.len() * DISTANCES.len();
+        let bad: Vec<String> = (0..cases).filter_map(|index| words(index, reason)).collect();
         if bad.is_empty() { "none".to_owned() } else { bad.join(", ") }
     };
     Ok(Outcome {
         setting: format!(
-            "WAM of 4 joints, 3 points; exploratory motions of 3 degrees, gain {GAIN}, {COMMANDS} commands, the Jacobian kept; \
-             `ours` has the defaults; a trial is a start"
+            "WAM of 4 joints, 3 points; exploratory motions of {:.0} degrees, gain {GAIN}, {COMMANDS} commands, the Jacobian kept; \
+             `ours` has the defaults; a trial is a start",
+            SIZE.to_degrees()
         ),
         measure: "3D error: mean distance of the points from their targets at the end [mm]; image error: root mean square of the rows [px]",
         abscissa: Some("distance of the cameras from the target [m]"),
         rows,
         notes: vec![
-            format!("stopped because errors grew: {}", all(DIVERGED)),
-            format!("refused before the arm moved, where both cameras see the same within the noise: {}", all(UNDETERMINED)),
+            format!("stopped because errors grew: {}", all(Ended::Diverged)),
+            format!("refused before the arm moved, as what is seen would not determine its motions: {}", all(Ended::Refused)),
+            format!("stopped for another reason: {}", all(Ended::Otherwise)),
             "published in words: the image error is much the same for both pairs of cameras, the 3D error grows with the distance, whole pixels \
              make it inconsistent, one camera converges more slowly and diverges at 0.6 m with 0.3 px; the thesis expects real trackers to err \
              more the farther they are"
                 .to_owned(),
-            "the published ratio is of two real experiments with cameras at about 90 degrees (0.0737 mm and 0.1321 mm): it is that of noise \
-             in proportion to the distance, 0.55²/0.4² = 1.89, and not of constant noise, 0.55/0.4 = 1.375"
+            "the published ratio, 1.79, is of two real experiments with cameras at about 90 degrees (0.0737 mm and 0.1321 mm), nearer to that of \
+             noise in proportion to the distance, 0.55²/0.4² = 1.89, than to that of constant noise, 0.55/0.4 = 1.375"
                 .to_owned(),
         ],
     })
 }
 
-/// Why runs were stopped before their end.
-const DIVERGED: f64 = 1.0;
-const UNDETERMINED: f64 = 2.0;
+/// How a run ended.
+#[derive(Clone, Copy, PartialEq)]
+enum Ended {
+    /// It went on to the end of the time.
+    InTime,
+    /// Errors grew.
+    Diverged,
+    /// Before anything moved.
+    Refused,
+    Otherwise,
+}
+
+impl Ended {
+    fn of(run: &Run) -> Ended {
+        match run.stop {
+            Stop::TimedOut { .. } => Ended::InTime,
+            Stop::Diverged { .. } => Ended::Diverged,
+            Stop::Undetermined { .. } if run.commands == 0 => Ended::Refused,
+            _ => Ended::Otherwise,
+        }
+    }
+}
 
 /// What is drawn where, and whether it is of images.
 const PANELS: [(&str, bool); 6] = [
@@ -125,8 +147,8 @@ const PANELS: [(&str, bool); 6] = [
     ("image error, one camera [px]", true),
 ];
 
-/// 3D errors [mm], then image errors [px], then why the run was stopped or 0: by views, trackers, distances.
-fn trial(seed: u64) -> Result<Vec<Option<f64>>, Error> {
+/// 3D errors [mm], then image errors [px], and how the runs ended: by views, trackers, distances.
+fn trial(seed: u64) -> Result<(Vec<Option<f64>>, Vec<Ended>), Error> {
     let arm = catalog::rig("wam4")?;
     let tip = Model::new(&arm)?.tip(&TARGET);
     let centre = POINTS.iter().map(|point| tip.transform(&(*point).into())).sum::<nalgebra::Vector3<f64>>() / 3.0;
@@ -160,10 +182,5 @@ fn trial(seed: u64) -> Result<Vec<Option<f64>>, Error> {
     let last = |run: &Run| run.moments.last().cloned();
     let in_space = runs.iter().map(|run| last(run).map(|moment| 1e3 * moment.error_m));
     let in_images = runs.iter().map(|run| last(run).and_then(|moment| moment.error_px));
-    let stopped = runs.iter().map(|run| match run.stop {
-        Stop::TimedOut { .. } => Some(0.0),
-        Stop::Undetermined { .. } => Some(UNDETERMINED),
-        _ => Some(DIVERGED),
-    });
-    Ok(in_space.chain(in_images).chain(stopped).collect())
+    Ok((in_space.chain(in_images).collect(), runs.iter().map(Ended::of).collect()))
 }

@@ -1,11 +1,11 @@
 //! A drone over a line: a pilot flies it, and its yaw is servoed without a rig to keep the line upright in its image.
-use super::controlled::{Controlled, serve};
 use super::scenes::curve;
 use crate::Error;
+use crate::experiments::controlled::{Controlled, servo};
 use crate::experiments::setting::trials;
 use crate::experiments::{Experiment, Options, Outcome, Row};
 use crate::servo::image_tasks::{Feature, ImageTask, Kind, LineAngle, Part, Place, Seen, Trackers};
-use crate::servo::uncalibrated::{Exploration, Phase, Quantity, Row as Signal, Settings};
+use crate::servo::uncalibrated::{Exploration, Quantity, Row as Signal, Settings};
 use crate::simulate::world::Drone;
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
@@ -30,7 +30,7 @@ const FLIGHTS: [(&str, [f64; 2], f64); 3] = [
     ("flown, turned by wind", [0.4, 0.3], PI / 180.0),
 ];
 
-/// Where it begins turned to [rad], at most and at least.
+/// How far it begins turned [rad], at least and at most.
 const TURNED: [f64; 2] = [20.0 * PI / 180.0, 70.0 * PI / 180.0];
 
 /// Height [m]; commands per swing of the pilot; seconds per command.
@@ -45,7 +45,10 @@ const HEADING: f64 = 0.2 * PI / 180.0;
 
 /// Commands after exploring, and what is shown.
 const COMMANDS: usize = 60;
-const SHOWN: (usize, usize) = (60, 5);
+const SHOWN: (usize, usize) = (COMMANDS, 5);
+
+/// Commands at the end that tell what is left.
+const LAST: usize = 20;
 
 /// g [m/s²]: a drone leans to where it accelerates.
 const GRAVITY: f64 = 9.81;
@@ -127,12 +130,13 @@ impl Controlled for Flight {
         self.task.values(&seen)
     }
 
-    fn carry_out(&mut self, motion: &[f64]) {
+    fn carry_out(&mut self, motion: &[f64]) -> Result<(), Error> {
         let mut normal = || self.random.sample::<f64, _>(StandardNormal);
         let turn = motion[0] * (1.0 + SHARE * normal()) + HEADING * normal();
         self.drone.yaw += turn + self.wind;
         self.time += 1.0;
         self.fly();
+        Ok(())
     }
 }
 
@@ -150,22 +154,28 @@ fn run(options: &Options) -> Result<Outcome, Error> {
         let settled: Vec<Option<f64>> = results
             .iter()
             .map(|runs| {
-                let last: Vec<f64> = runs[index].0[1].iter().rev().take(20).flatten().copied().collect();
+                let last: Vec<f64> = runs[index].0[1].iter().rev().take(LAST).flatten().copied().collect();
                 Some((last.iter().map(|off| off * off).sum::<f64>() / last.len().max(1) as f64).sqrt())
             })
             .collect();
-        ends.push(Row::new(format!("nose off the line, last 20 commands, {series}, degrees"), None, &settled));
+        ends.push(Row::new(format!("nose off the line, last {LAST} commands, {series}, degrees"), None, &settled));
         let stopped = results.iter().filter(|runs| runs[index].1).count();
         notes.push(format!("{series}: {stopped} of {} were stopped before the end", results.len()));
     }
     rows.extend(ends);
-    notes.push("with gain 0.5, wind of 1 degree per command leaves 1/0.5 of that, 2 degrees".to_owned());
+    let (gain, wind) = (Settings::default().gain, FLIGHTS[2].2.to_degrees());
+    notes.push(format!(
+        "with gain {gain}, wind of {wind:.1} degrees per command leaves 1/{gain} of that, {:.1} degrees",
+        wind / gain
+    ));
     notes.push("published in words: the pilot takes roll, pitch and elevation, servoing the yaw".to_owned());
     Ok(Outcome {
         setting: format!(
-            "a drone 1.5 m above a line, its camera down, {NOISE} px at two points of the line, a compass; turns err by {} %; our defaults; a trial is a start turned by 20 to \
-             70 degrees",
-            100.0 * SHARE
+            "a drone {HEIGHT} m above a line, its camera down, {NOISE} px at two points of the line, a compass; turns err by {} %; our defaults but \
+             for larger exploratory motions; a trial is a start turned by {:.0} to {:.0} degrees",
+            100.0 * SHARE,
+            TURNED[0].to_degrees(),
+            TURNED[1].to_degrees()
         ),
         measure: "error of the line [px], angle between nose and line [degrees]",
         abscissa: Some("commands after exploring"),
@@ -183,8 +193,6 @@ fn trial(flight: ([f64; 2], f64), seed: u64) -> Result<Flown, Error> {
     // Motions that stand out against what the pilot and the wind do meanwhile.
     let exploration = Exploration { size: 0.15, largest: 0.3, ..Exploration::default() };
     let settings = Settings { exploration, ..Settings::default() };
-    let course = serve(&mut world, &settings, COMMANDS, &mut |world, phase| {
-        off.extend((*phase != Phase::Exploring).then_some(Some(world.off())));
-    })?;
-    Ok(([course.errors.iter().copied().map(Some).collect(), off], course.stop.is_some()))
+    let found = servo(&mut world, &settings, COMMANDS, &mut |world, _| off.push(Some(world.off())))?;
+    Ok(([found.errors.iter().copied().map(Some).collect(), off], found.stop.is_some()))
 }

@@ -1,6 +1,6 @@
 //! Servoing without a rig: what Ramirez, "Towards Practical Uncalibrated Visual Servoing", 2016, did with robots or tells in words, in
-//! simulation. Arms are scenes, run as `handeye servo` runs them; what is no arm before cameras is [`controlled::Controlled`].
-pub(super) mod controlled;
+//! simulation. Arms are scenes, run as `handeye servo` runs them; what is no arm before cameras is
+//! [`Controlled`](super::controlled::Controlled).
 mod dead_band;
 mod depth_camera;
 mod distance;

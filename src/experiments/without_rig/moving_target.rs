@@ -1,11 +1,12 @@
 //! A target that somebody's hand moves along a recorded path, and an arm that follows it.
-use super::scenes::{against_command, endless, ends, go, meeting, near, scene};
+use super::scenes::{UR5_POINTS, UR5_TARGET, against_command, endless, ends, go, meeting, near, scene};
 use crate::Error;
 use crate::experiments::setting::trials;
 use crate::experiments::{Experiment, Options, Outcome, Row};
 use crate::rig::catalog;
 use crate::scene::{Run, Waypoint};
 use crate::servo::image_tasks::Trackers;
+use crate::servo::uncalibrated::Settings;
 use crate::simulate::world::Tracker;
 use handeye_solvers::Pose;
 use nalgebra::{Matrix3, Vector3};
@@ -40,8 +41,7 @@ const PATH: [[f64; 4]; 9] = [
 const BEGINS: f64 = 40.0;
 const COMMANDS: usize = 180;
 
-const POINTS: [[f64; 3]; 4] = [[0.08, 0.0, 0.05], [-0.06, 0.06, 0.06], [-0.05, -0.07, 0.08], [0.0, 0.02, 0.15]];
-const TARGET: [f64; 6] = [0.0, -1.3, 1.2, -1.5, -1.6, 0.3];
+/// How far the joints begin from where they shall be [rad], and noise of the trackers [px].
 const AWAY: f64 = 0.15;
 const NOISE: f64 = 0.3;
 
@@ -64,12 +64,16 @@ fn run(options: &Options) -> Result<Outcome, Error> {
         notes.push(format!("{series}, {per_command:.1} mm per command at first: {}", ends(&runs)));
     }
     rows.extend(lags);
-    notes.push("with gain 0.5, an arm that is not told how fast its target moves lags by 2 of its motions where its Jacobian is right".to_owned());
+    let gain = Settings::default().gain;
+    notes.push(format!(
+        "with gain {gain}, an arm that is not told how fast its target moves lags by {} of its motions where its Jacobian is right",
+        1.0 / gain
+    ));
     notes.push("published in words: targets are set by touch and by gestures of a tracked body; `timed-out` is the end of the time".to_owned());
     Ok(Outcome {
         setting: format!(
             "UR5, 4 points of the hand and as many of a target that a person's hand moves after {BEGINS} commands, 2 cameras, {NOISE} px; our \
-             defaults, gain 0.5; a trial is a start"
+             defaults, gain {gain}; a trial is a start"
         ),
         measure: "root mean square of the rows [px], mean distance of the hand's points from the target's [mm]",
         abscissa: Some("commands, those of exploring included"),
@@ -82,8 +86,8 @@ fn trial(seed: u64) -> Result<Vec<Run>, Error> {
     let mut runs = Vec::new();
     for (_, speed) in SPEEDS {
         let trackers = Trackers { pixels: NOISE, ..Trackers::default() };
-        let task = meeting(&["left", "right"], &POINTS, trackers)?;
-        let mut scene = scene(catalog::rig("ur5")?, task, near(&TARGET, AWAY, seed), TARGET.to_vec(), seed);
+        let task = meeting(&["left", "right"], &UR5_POINTS, trackers)?;
+        let mut scene = scene(catalog::rig("ur5")?, task, near(&UR5_TARGET, AWAY, seed), UR5_TARGET.to_vec(), seed);
         scene.world.tracker = Tracker::Gaussian(NOISE);
         let waypoint = |[time, x, y, z]: [f64; 4]| Waypoint {
             time: BEGINS + time / speed,

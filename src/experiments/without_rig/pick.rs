@@ -1,5 +1,5 @@
 //! Pick alignment: two cameras on the hand bring its gripper, which is fixed in their images, to an object.
-use super::scenes::{against_command, camera, ends, go, looking, scene};
+use super::scenes::{UR5_TARGET, against_command, camera, ends, go, scene, view};
 use crate::Error;
 use crate::experiments::setting::trials;
 use crate::experiments::{Experiment, Options, Outcome, Row};
@@ -24,8 +24,7 @@ pub(in crate::experiments) const PICK: Experiment = Experiment {
     run,
 };
 
-/// Where the joints are with the object in the gripper [rad], and how far from there the hand begins along each axis [m].
-const TARGET: [f64; 6] = [0.0, -1.3, 1.2, -1.5, -1.6, 0.3];
+/// How far the hand begins from where the object is in the gripper, along each axis [m].
 const AWAY: f64 = 0.06;
 
 /// The gripper, the cameras, and what these look at, in the tip's frame [m].
@@ -78,18 +77,20 @@ fn run(options: &Options) -> Result<Outcome, Error> {
 fn trial(seed: u64) -> Result<Vec<Run>, Error> {
     let arm = catalog::rig("ur5")?;
     let names = ["left", "right"];
-    let pose = |from: &Vector3<f64>| looking(*from, GRIPPER, Vector3::y());
-    let cameras =
-        names.iter().zip(&CAMERAS).map(|(name, from)| camera(name, Parent::Tip, pose(from), 600.0, [640, 480]));
-    let rig = Rig { cameras: cameras.collect(), features: Vec::new(), ..arm };
+    let mut cameras = Vec::new();
+    for (name, from) in names.iter().zip(&CAMERAS) {
+        let pose = view(from, &GRIPPER, &Vector3::y())?;
+        cameras.push(camera(name, Parent::Tip, pose, 600.0, [640, 480]));
+    }
+    let rig = Rig { cameras, features: Vec::new(), ..arm };
     // As anybody sees who looks at the images: where the gripper is in them.
     let gripper = rig::Feature { name: "gripper".to_owned(), parent: Parent::Tip, xyz: Some(GRIPPER.into()) };
     let model = Model::new(&Rig { features: vec![gripper], ..rig.clone() })?;
-    let links = model.links(&TARGET);
+    let links = model.links(&UR5_TARGET);
     let pixels: Vec<[f64; 2]> = (0..names.len()).map(|camera| model.pixel(camera, 0, &links)).collect();
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let away = Vector3::from_fn(|_, _| random.random_range(-AWAY..AWAY));
-    let mut placed = World::new(&rig, &TARGET, WorldOptions::default())?;
+    let mut placed = World::new(&rig, &UR5_TARGET, WorldOptions::default())?;
     placed.execute(&Command::PoseDelta(Pose { translation: away, ..Pose::identity() }), 1.0)?;
     let start = placed.joints().to_vec();
     let mut runs = Vec::new();
@@ -101,7 +102,7 @@ fn trial(seed: u64) -> Result<Vec<Run>, Error> {
         let part = Part { kind: Kind::PointToPoint(PointToPoint { point: 0, to: 1 }), cameras: vec![0, 1] };
         let trackers = Trackers { pixels: noise, ..Trackers::default() };
         let task = ImageTask::new(None, names.map(str::to_owned).to_vec(), features, vec![part], trackers)?;
-        let mut scene = scene(rig.clone(), task, start.clone(), TARGET.to_vec(), seed);
+        let mut scene = scene(rig.clone(), task, start.clone(), UR5_TARGET.to_vec(), seed);
         scene.takes = Takes::PoseDelta;
         scene.world.tracker = Tracker::Gaussian(noise);
         let mut execution = Execution::default();

@@ -1,20 +1,33 @@
 //! Scenes that experiments are made of.
 use crate::Error;
 use crate::experiments::Row;
+use crate::geometry::looking_at;
 use crate::rig::{Camera, Parent, Rig};
 use crate::scene::{Control, Moment, Run, Scene, Target, UncalibratedControl, run};
 use crate::servo::image_tasks::{Feature, ImageTask, Kind, Part, Place, PointToPoint, Trackers};
 use crate::servo::{LoopSettings, Takes};
 use crate::simulate::world::WorldOptions;
 use handeye_solvers::Pose;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::ops::ControlFlow;
 
-/// A scene of a rig whose arm shall be where the task is solved with these joints: a robot that takes joint motions and errs in nothing,
-/// exact trackers, an uncalibrated controller with its defaults.
+/// Where the joints of the UR5 shall be [rad].
+pub(super) const UR5_TARGET: [f64; 6] = [0.0, -1.3, 1.2, -1.5, -1.6, 0.3];
+
+/// Points of its hand in the tip's frame, which shall meet as many of a target [m].
+pub(super) const UR5_POINTS: [[f64; 3]; 4] =
+    [[0.08, 0.0, 0.05], [-0.06, 0.06, 0.06], [-0.05, -0.07, 0.08], [0.0, 0.02, 0.15]];
+
+/// A scene of a rig whose arm shall be where the task is solved with these joints.
 pub(super) fn scene(rig: Rig, task: ImageTask, start: Vec<f64>, target: Vec<f64>, seed: u64) -> Scene {
+    Scene { task: Some(task), ..scene_of_features(rig, start, target, seed) }
+}
+
+/// A scene of a rig whose features shall be seen where they are with these joints: a robot that takes joint motions and errs in nothing,
+/// exact trackers, an uncalibrated controller with its defaults.
+pub(super) fn scene_of_features(rig: Rig, start: Vec<f64>, target: Vec<f64>, seed: u64) -> Scene {
     Scene {
         name: None,
         rig: Some(rig),
@@ -22,7 +35,7 @@ pub(super) fn scene(rig: Rig, task: ImageTask, start: Vec<f64>, target: Vec<f64>
         faults: Vec::new(),
         slips: Vec::new(),
         couplings: Vec::new(),
-        task: Some(task),
+        task: None,
         takes: Takes::JointDelta,
         start,
         target: Target { joints: target, until: f64::INFINITY, ..Target::default() },
@@ -30,6 +43,7 @@ pub(super) fn scene(rig: Rig, task: ImageTask, start: Vec<f64>, target: Vec<f64>
         limits: Vec::new(),
         settings: LoopSettings::default(),
         dt: 1.0,
+        files: Vec::new(),
     }
 }
 
@@ -86,11 +100,12 @@ pub(super) fn camera(name: &str, parent: Parent, pose: Pose, focal: f64, size: [
     }
 }
 
-/// A pose from which a camera looks at a point, its images upright where `down` points down.
-pub(super) fn looking(from: Vector3<f64>, at: Vector3<f64>, down: Vector3<f64>) -> Pose {
-    let ahead = (at - from).normalize();
-    let right = down.cross(&ahead).normalize();
-    Pose { translation: from, rotation: Matrix3::from_columns(&[right, ahead.cross(&right), ahead]) }
+/// `world_from_camera` of a camera that looks at a place [m], its images upright where `down` points down.
+///
+/// Errors: [`Error::Unusable`] where it would look at itself, or along `down`.
+pub(super) fn view(from: &Vector3<f64>, at: &Vector3<f64>, down: &Vector3<f64>) -> Result<Pose, Error> {
+    looking_at(from, at, down)
+        .ok_or_else(|| Error::Unusable("a camera cannot look at itself, or straight down".to_owned()))
 }
 
 /// One row for every few commands, of runs that count where they ended from then on.

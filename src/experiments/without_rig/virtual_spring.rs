@@ -1,8 +1,8 @@
 //! A virtual spring: its centre is moved over a table on which the arm presses, until the tool is seen at a target.
-use super::controlled::{Controlled, serve};
-use super::scenes::{curve, looking};
+use super::scenes::{curve, view};
 use crate::Error;
 use crate::camera::{CameraModel, PARAMETERS};
+use crate::experiments::controlled::{Controlled, servo};
 use crate::experiments::setting::trials;
 use crate::experiments::{Experiment, Options, Outcome, Row};
 use crate::rig::{Model, Rig, catalog};
@@ -48,7 +48,7 @@ const NOISE: f64 = 0.3;
 
 /// Commands after exploring, and what is shown.
 const COMMANDS: usize = 40;
-const SHOWN: (usize, usize) = (40, 4);
+const SHOWN: (usize, usize) = (COMMANDS, 4);
 
 /// An arm on a table, seen by two cameras.
 struct Pressing {
@@ -74,16 +74,12 @@ impl Pressing {
         let middle = 0.5 * (tool + target);
         let mut intrinsics = [0.0; PARAMETERS];
         intrinsics[..4].copy_from_slice(&[800.0, 800.0, 320.0, 240.0]);
-        let view = |from: Vector3<f64>| View {
-            model: CameraModel::Pinhole,
-            intrinsics,
-            pose: looking(middle + from, middle, -Vector3::z()),
-            on_hand: false,
-        };
-        let geometry = Geometry {
-            cameras: vec![view(Vector3::new(0.5, -0.6, 0.6)), view(Vector3::new(0.6, 0.5, 0.7))],
-            points: vec![Vector3::zeros(), target],
-        };
+        let mut cameras = Vec::new();
+        for from in [Vector3::new(0.5, -0.6, 0.6), Vector3::new(0.6, 0.5, 0.7)] {
+            let pose = view(&(middle + from), &middle, &-Vector3::z())?;
+            cameras.push(View { model: CameraModel::Pinhole, intrinsics, pose, on_hand: false });
+        }
+        let geometry = Geometry { cameras, points: vec![Vector3::zeros(), target] };
         let features = vec![
             Feature { name: "tool".to_owned(), place: Place::Hand(None) },
             Feature { name: "mark".to_owned(), place: Place::Target(None) },
@@ -95,7 +91,7 @@ impl Pressing {
         let mut arm = SpringArm::new(&rig, &START, spring)?;
         // The spring takes hold.
         let centre = tool - BELOW * Vector3::z();
-        arm.pull(&tool, &centre, 1.0);
+        arm.pull(&tool, &centre, 1.0)?;
         Ok(Pressing { arm, centre, target, task, geometry, random, least_contact: f64::INFINITY })
     }
 
@@ -132,13 +128,14 @@ impl Controlled for Pressing {
         self.task.values(&seen)
     }
 
-    fn carry_out(&mut self, motion: &[f64]) {
+    fn carry_out(&mut self, motion: &[f64]) -> Result<(), Error> {
         let there = self.centre + UNIT * Vector3::new(motion[0], motion[1], 0.0);
         // The centre is kept below the tool, which presses with the same force wherever it is.
         let there = Vector3::new(there.x, there.y, self.arm.tip().translation.z - BELOW);
-        self.arm.pull(&self.centre, &there, 1.0);
+        self.arm.pull(&self.centre, &there, 1.0)?;
         self.centre = there;
         self.least_contact = self.least_contact.min(self.arm.contact());
+        Ok(())
     }
 }
 
@@ -169,8 +166,10 @@ fn run(options: &Options) -> Result<Outcome, Error> {
     }
     rows.extend(ends);
     notes.push(format!(
-        "at rest the tool presses with K times {BELOW} m: {} N; friction then holds it where the centre is within 4 and 10 mm of it",
-        STIFFNESS * BELOW
+        "at rest the tool presses with K times {BELOW} m: {} N; friction then holds it where the centre is within {} mm of it",
+        STIFFNESS * BELOW,
+        // Coulomb's μ K below = K off.
+        FRICTION.map(|(_, friction)| format!("{:.0}", 1e3 * friction * BELOW)).join(", ")
     ));
     notes.push("published in words: contacts between a solid table and the robot could safely be made".to_owned());
     Ok(Outcome {
@@ -192,13 +191,11 @@ fn press(friction: f64, seed: u64) -> Result<Pressed, Error> {
     // What sticks and slips teaches nothing of the slopes.
     let settings = Settings { exploration, update: Update::Keep, ..Settings::default() };
     let mut curves: [Vec<Option<f64>>; 3] = Default::default();
-    let course = serve(&mut world, &settings, COMMANDS, &mut |world, phase| {
-        if *phase != crate::servo::uncalibrated::Phase::Exploring {
-            curves[1].push(Some(1e3 * world.off()));
-            curves[2].push(Some(world.arm.contact()));
-        }
+    let found = servo(&mut world, &settings, COMMANDS, &mut |world, _| {
+        curves[1].push(Some(1e3 * world.off()));
+        curves[2].push(Some(world.arm.contact()));
     })?;
     // Four rows, of which the sum of the absolute errors is known.
-    curves[0] = course.errors.iter().map(|sum| Some(sum / 4.0)).collect();
-    Ok(Pressed { curves, least_contact: world.least_contact, stopped: course.stop.is_some() })
+    curves[0] = found.errors.iter().map(|sum| Some(sum / 4.0)).collect();
+    Ok(Pressed { curves, least_contact: world.least_contact, stopped: found.stop.is_some() })
 }

@@ -60,36 +60,41 @@ fn run(options: &Options) -> Result<Outcome, Error> {
         rows.extend(against_command("image error [px]", series, &runs, SHOWN, |moment| moment.error_px));
         rows.extend(against_command("turned by [degrees]", series, &runs, SHOWN, |moment| Some(turned(moment))));
     }
-    let mut notes = vec![
-        "how runs end, by how far they begin turned; those on the right side and on the other converge, and so cannot be told apart by their \
-         errors"
-            .to_owned(),
-    ];
+    let is_right = |run: &Run| run.moments.last().is_some_and(|end| turned(end) < SAME);
+    let is_other = |run: &Run| run.moments.last().is_some_and(|end| turned(end) >= 180.0 - SAME);
+    let untold: Vec<Run> = (0..TURNS.len()).flat_map(|turn| of(turn, false)).collect();
+    let sides = [end(&untold, "on the right side", is_right), end(&untold, "on the other", is_other)];
+    let mut notes = vec![sides.join(", ")];
+    notes.push("how runs end, by how far they begin turned:".to_owned());
     for told in [false, true] {
         for (index, turn) in TURNS.iter().enumerate() {
             let runs = of(index, told);
-            let ended = |least: f64, most: f64| {
-                let is_there = |run: &Run| run.moments.last().is_some_and(|end| (least..most).contains(&turned(end)));
+            let ended = |is_there: &dyn Fn(&Run) -> bool| {
                 runs.iter().map(|run| Some(f64::from(u8::from(is_there(run))))).collect::<Vec<_>>()
             };
             let side = if told { ", side told" } else { "" };
             rows.push(Row::new(
                 format!("share on the right side, begins turned by {turn}°{side}"),
                 None,
-                &ended(0.0, SAME),
+                &ended(&is_right),
             ));
             rows.push(Row::new(
                 format!("share on the other side, begins turned by {turn}°{side}"),
                 None,
-                &ended(180.0 - SAME, 181.0),
+                &ended(&is_other),
             ));
             notes.push(format!("  {turn}°{side}: {}", ends(&runs)));
         }
     }
+    let beyond: Vec<Run> =
+        (0..TURNS.len()).filter(|turn| TURNS[*turn] > 90.0).flat_map(|turn| of(turn, true)).collect();
+    let sides = [end(&beyond, "on the right side", is_right), end(&beyond, "elsewhere", |run| !is_right(run))];
+    notes.push(format!(
+        "`side told` adds parallel lines with a direction; of what then begins beyond 90°, {}",
+        sides.join(", ")
+    ));
     notes.push(
-        "published in words: an unexpected solution, the wrench's other points towards the left or the right, for the same errors; `side told` \
-         adds parallel lines with a direction, and what begins beyond 90° then ends with errors that say so, or on the right side"
-            .to_owned(),
+        "published in words: an unexpected solution, the wrench's other points towards the left or the right, for the same errors".to_owned(),
     );
     Ok(Outcome {
         setting: format!("UR5, the shipped task `wrench`, 2 cameras, {NOISE} px; our defaults; a trial is a start"),
@@ -98,6 +103,15 @@ fn run(options: &Options) -> Result<Outcome, Error> {
         rows,
         notes,
     })
+}
+
+/// How many of the runs end there, and what is left of their errors.
+fn end(runs: &[Run], place: &str, is_there: impl Fn(&Run) -> bool) -> String {
+    let there: Vec<&Run> = runs.iter().filter(|run| is_there(run)).collect();
+    let errors: Vec<Option<f64>> = there.iter().map(|run| run.moments.last().and_then(|end| end.error_px)).collect();
+    let median = Row::new("", None, &errors).median();
+    let median = median.map_or(String::new(), |median| format!(" with {median:.2} px in the median"));
+    format!("{} of {} end {place}{median}", there.len(), runs.len())
 }
 
 /// Runs by whether the side is told, then by turn.

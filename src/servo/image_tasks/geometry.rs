@@ -1,8 +1,8 @@
 //! Where a task's features and cameras are in space, for the checker and for simulation.
-use super::{Feature, ImageTask, Part, Place, Seen};
+use super::{Feature, Found, ImageTask, InRig, Part, Place, Seen};
 use crate::Error;
 use crate::camera::{CameraModel, PARAMETERS};
-use crate::rig::{Model, Parent, Rig};
+use crate::rig::{Model, ModelCamera, Rig};
 use handeye_solvers::{Pose, Scalar};
 use nalgebra::Vector3;
 
@@ -32,48 +32,21 @@ impl Geometry {
     /// From a complete rig, whose tip is the hand. Features that have a place in the task are there, others where the rig has those of the
     /// same names.
     ///
-    /// Errors: [`Error::Unusable`] where the rig has no camera or feature of a name, or has it on a link before the tip, or on the tip where
-    /// the task has it on the target.
+    /// Errors: [`Error::Unusable`] where the rig is not complete, has no camera or feature of a name, has it on a link before the tip, or on the
+    /// tip where the task has it on the target.
     pub fn of_rig(task: &ImageTask, rig: &Rig) -> Result<Self, Error> {
+        let InRig { cameras, features } = task.in_rig(rig)?;
         let model = Model::new(rig)?;
-        let last = rig.robot.joints.len().checked_sub(1);
-        let is_on_hand = |parent: Parent, what: &str| match parent {
-            Parent::World => Ok(false),
-            Parent::Tip => Ok(true),
-            Parent::Link(link) if Some(link) == last => Ok(true),
-            Parent::Link(_) => Err(Error::Unusable(format!(
-                "{what} is on a link before the tip; a task is checked with what is on the tip or in the world"
-            ))),
+        let view = |(index, on_hand): (usize, bool)| {
+            let ModelCamera { model, intrinsics, pose, .. } = model.cameras[index];
+            View { model, intrinsics, pose, on_hand }
         };
-        let mut cameras = Vec::new();
-        for name in task.cameras() {
-            let index = rig.cameras.iter().position(|camera| camera.name == *name).ok_or_else(|| {
-                let known: Vec<&str> = rig.cameras.iter().map(|camera| camera.name.as_str()).collect();
-                Error::Unusable(format!("the rig has no camera `{name}` (known: {})", known.join(", ")))
-            })?;
-            let camera = &model.cameras[index];
-            let on_hand = is_on_hand(camera.parent, &format!("camera `{name}`"))?;
-            cameras.push(View { model: camera.model, intrinsics: camera.intrinsics, pose: camera.pose, on_hand });
-        }
-        let point = |feature: &Feature| -> Result<Vector3<f64>, Error> {
-            let name = &feature.name;
-            if let Some(xyz) = feature.place.xyz() {
-                return Ok(xyz);
-            }
-            let index = rig.features.iter().position(|known| known.name == *name).ok_or_else(|| {
-                let place = feature.place.name();
-                Error::Unusable(format!("feature `{name}` on {place} is not in the rig: give its `xyz` in the task"))
-            })?;
-            let found = &model.features[index];
-            if is_on_hand(found.parent, &format!("feature `{name}`"))? != matches!(feature.place, Place::Hand(_)) {
-                let place = feature.place.name();
-                return Err(Error::Unusable(format!(
-                    "feature `{name}` is on {place} in the task, and not so in the rig"
-                )));
-            }
-            Ok(found.xyz)
+        let point = |found: Found| match found {
+            Found::Image => Vector3::zeros(),
+            Found::Task(xyz) => xyz,
+            Found::Rig(index) => model.features[index].xyz,
         };
-        let points = task.features().iter().map(point).collect::<Result<_, _>>()?;
+        let (cameras, points) = (cameras.into_iter().map(view).collect(), features.into_iter().map(point).collect());
         Ok(Geometry { cameras, points })
     }
 

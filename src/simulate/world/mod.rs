@@ -27,7 +27,7 @@ use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use robot::Robot;
-use sight::in_world;
+use sight::{Report, in_world};
 use std::collections::VecDeque;
 
 /// How a world differs from its rig.
@@ -88,8 +88,8 @@ pub struct World {
     slipped: Vec<f64>,
     /// How it was, as long ago as the latency reaches.
     past: VecDeque<Moment>,
-    /// What trackers with faults reported last [px], in the order of the faults.
-    reported: Vec<Option<[f64; 2]>>,
+    /// What trackers with faults reported last, in the order of the faults.
+    reported: Vec<Option<Report>>,
     executing: ChaCha8Rng,
     observing: ChaCha8Rng,
     sounding: ChaCha8Rng,
@@ -126,9 +126,8 @@ impl World {
                 "`missed` is a share between 0 and 1, noise of readings and points and latency are 0 or more; found {shares:?}"
             )));
         }
-        if let Some(slip) = options.slips.iter().find(|slip| slip.joint >= n || !slip.by.is_finite()) {
-            return Err(Error::Unusable(format!("{slip:?} is not of a joint of {n}, or not by a finite number")));
-        }
+        options.slips.iter().try_for_each(|slip| slip.check(n))?;
+        options.faults.iter().try_for_each(|fault| fault.check(rig))?;
         let (features, places) = in_natural_order(rig);
         let stream = |number| {
             let mut random = ChaCha8Rng::seed_from_u64(options.seed);
@@ -299,7 +298,7 @@ impl World {
         Moment { time: self.time, joints, slipped, objects }
     }
 
-    /// How it was at a time that is remembered: commands move the joints evenly.
+    /// How it was at a time that is remembered: commands move the joints evenly, and whoever carries things about moves these so.
     fn then(&self, time: f64) -> Moment {
         let after = self.past.iter().position(|moment| moment.time >= time).unwrap_or(self.past.len() - 1);
         let (to, from) = (&self.past[after], &self.past[after.saturating_sub(1)]);
@@ -307,7 +306,8 @@ impl World {
             if to.time > from.time { ((time - from.time) / (to.time - from.time)).clamp(0.0, 1.0) } else { 1.0 };
         let between = |from: &[f64], to: &[f64]| from.iter().zip(to).map(|(a, b)| a + share * (b - a)).collect();
         let (joints, slipped) = (between(&from.joints, &to.joints), between(&from.slipped, &to.slipped));
-        Moment { time, joints, slipped, objects: to.objects.clone() }
+        let objects = from.objects.iter().zip(&to.objects).map(|(a, b)| a.between(b, share)).collect();
+        Moment { time, joints, slipped, objects }
     }
 }
 

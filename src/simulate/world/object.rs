@@ -1,4 +1,5 @@
 //! Things that a robot grasps, or puts others into.
+use crate::geometry::between;
 use handeye_solvers::Pose;
 
 /// A rigid thing that carries features. The rig has them on the tip, where they are when the thing is held (or inserted into) as it
@@ -35,6 +36,15 @@ impl Object {
         if !self.is_held {
             self.place = world_from_tip;
         }
+    }
+
+    /// The same at a share of the way to where it is at a later moment: evenly moved, or held by whoever holds it then.
+    pub(super) fn between(&self, later: &Object, share: f64) -> Object {
+        // Who grasps does so at the beginning of a motion.
+        if self.is_held != later.is_held {
+            return later.clone();
+        }
+        Object { place: between(&self.place, &later.place, share), ..later.clone() }
     }
 
     /// True where it moves with the tip.

@@ -1,6 +1,7 @@
 //! How a simulated robot carries out commands: inexactly, and inside the limits of its joints.
 use crate::Error;
 use crate::chain::{JointChain, Posture};
+use crate::geometry::between;
 use crate::recording::Command;
 use crate::rig::{Limits, PoseNoise, Rig};
 use crate::simulate::measure::moved;
@@ -35,7 +36,7 @@ pub struct Coupling {
     pub joint: usize,
     /// Index of the joint that does so.
     pub by: usize,
-    /// Motion of the one over that of the other.
+    /// Motion of the one over that of the other, as far as both are from the ends of their limits.
     pub share: f64,
 }
 
@@ -94,7 +95,9 @@ impl Robot {
             let motion = if motion.abs() < noise.dead_band { &0.0 } else { motion };
             joints[i] + gain * motion + noise.joints * normal() + noise.share * motion * normal()
         });
-        let moved: Vec<f64> = moved.collect();
+        let mut moved: Vec<f64> = moved.collect();
+        // A joint drags others along as far as it moves itself, and none of them past its end.
+        self.stop_at_ends(&mut moved);
         let mut after = moved.clone();
         for Coupling { joint, by, share } in &noise.couplings {
             after[*joint] += share * (moved[*by] - joints[*by]);
@@ -112,16 +115,13 @@ impl Robot {
         let blur = |sd: f64, share: f64| sd.hypot(noise.share * share);
         let sd = PoseNoise { xyz: blur(noise.pose.xyz, shift), rot: blur(noise.pose.rot, turn) };
         let executed = moved(*action, sd, || random.sample::<f64, _>(StandardNormal));
-        // Along the screw, by steps short enough that the joints stay on their branch.
+        // By steps short enough that the joints stay on their branch.
         let target = executed * tip;
-        let way = (so3::log(&(target.rotation * tip.rotation.transpose())), target.translation - tip.translation);
-        let steps = (way.0.norm() / TURN).max(way.1.norm() / SHIFT).ceil().clamp(1.0, 1e4);
+        let [turn, shift] = [tip.angle_to(&target), (target.translation - tip.translation).norm()];
+        let steps = (turn / TURN).max(shift / SHIFT).ceil().clamp(1.0, 1e4);
         let (mut joints, mut posture) = (joints.to_vec(), Posture::default());
         for step in 1..=steps as usize {
-            let share = step as f64 / steps;
-            let rotation = so3::exp(&(way.0 * share)) * tip.rotation;
-            let between = Pose { rotation, translation: tip.translation + way.1 * share };
-            self.reach(&mut joints, &between, &mut posture);
+            self.reach(&mut joints, &between(&tip, &target, step as f64 / steps), &mut posture);
         }
         joints
     }

@@ -7,11 +7,26 @@ use nalgebra::Vector3;
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-/// A feature in view, exactly.
+/// A feature in view: exactly, until it is reported.
 struct InView {
-    detection: Detection,
-    /// In the camera's frame [m].
-    point: Vector3<f64>,
+    camera: u32,
+    feature: u32,
+    report: Report,
+}
+
+/// What a tracker says of a feature.
+#[derive(Clone, Copy)]
+pub(super) struct Report {
+    /// Where it is in the image [px].
+    pub pixel: [f64; 2],
+    /// Where it is in the camera's frame [m], which only depth cameras tell.
+    pub point: Vector3<f64>,
+}
+
+impl InView {
+    fn detection(&self) -> Detection {
+        Detection { camera: self.camera, feature: self.feature, pixel: self.report.pixel }
+    }
 }
 
 impl World {
@@ -24,48 +39,49 @@ impl World {
         let readings: Option<Vec<f64>> = self.options.readings.map(reading);
         let mut seen = self.in_view(&self.model.links(&joints), &objects);
         let (random, tracker, missed) = (&mut self.observing, self.options.tracker, self.options.missed);
-        seen.retain_mut(|InView { detection, point }| {
+        seen.retain_mut(|InView { report: Report { pixel, point }, .. }| {
             // As many random numbers whatever happens.
             let is_seen = random.random::<f64>() >= missed;
-            detection.pixel = tracker.report(detection.pixel, point.norm(), random);
+            *pixel = tracker.report(*pixel, point.norm(), random);
             is_seen
         });
-        for (fault, reported) in self.options.faults.iter().zip(&mut self.reported) {
+        let (random, sd) = (&mut self.sounding, self.options.points);
+        for InView { report, .. } in seen.iter_mut().filter(|seen| self.depth[seen.camera as usize]) {
+            report.point = report.point.map(|x| x + sd * random.sample::<f64, _>(StandardNormal));
+        }
+        for (fault, before) in self.options.faults.iter().zip(&mut self.reported) {
             let Some(&feature) = self.places.get(fault.feature) else { continue };
-            let of_fault =
-                |seen: &InView| (seen.detection.camera as usize, seen.detection.feature) == (fault.camera, feature);
+            let of_fault = |seen: &InView| (seen.camera as usize, seen.feature) == (fault.camera, feature);
             if let Some(at) = seen.iter().position(of_fault) {
-                match fault.report(seen[at].detection.pixel, *reported, time) {
-                    Some(pixel) => (seen[at].detection.pixel, *reported) = (pixel, Some(pixel)),
+                match fault.report(&self.model.cameras[fault.camera], seen[at].report, *before, time) {
+                    Some(report) => (seen[at].report, *before) = (report, Some(report)),
                     None => drop(seen.remove(at)),
                 }
             }
         }
-        let (random, sd) = (&mut self.sounding, self.options.points);
-        let deep = seen.iter().filter(|seen| self.depth[seen.detection.camera as usize]);
-        let points = deep.map(|InView { detection: Detection { camera, feature, .. }, point }| PointDetection {
+        let deep = seen.iter().filter(|seen| self.depth[seen.camera as usize]);
+        let points = deep.map(|InView { camera, feature, report }| PointDetection {
             camera: *camera,
             feature: *feature,
-            point: point.map(|x| x + sd * random.sample::<f64, _>(StandardNormal)).into(),
+            point: report.point.into(),
         });
         Sample {
             time: Some(time),
             joints: readings,
             points: points.collect(),
-            pixels: seen.iter().map(|seen| seen.detection).collect(),
+            pixels: seen.iter().map(InView::detection).collect(),
             ..Sample::default()
         }
     }
 
     /// What would be seen at some joints, exactly.
     pub fn exact(&self, joints: &[f64]) -> Vec<Detection> {
-        self.in_view(&self.model.links(joints), &self.objects).into_iter().map(|seen| seen.detection).collect()
+        self.in_view(&self.model.links(joints), &self.objects).iter().map(InView::detection).collect()
     }
 
     /// What would be seen with the tip at a pose of the world, exactly; links before it stay where they are.
     pub fn exact_with_tip(&self, world_from_tip: &Pose) -> Vec<Detection> {
-        let seen = self.in_view(&self.links_with_tip(world_from_tip), &self.objects);
-        seen.into_iter().map(|seen| seen.detection).collect()
+        self.in_view(&self.links_with_tip(world_from_tip), &self.objects).iter().map(InView::detection).collect()
     }
 
     /// All features in view of cameras, in the order of recordings.
@@ -79,11 +95,11 @@ impl World {
             for (point, &feature) in in_world.iter().zip(&self.places) {
                 let point = world_from_camera.inverse_transform(point);
                 let pixel = camera.pixel_inside(self.sizes[index], &point);
-                let detection = |pixel| Detection { camera: index as u32, feature, pixel };
-                seen.extend(pixel.map(|pixel| InView { detection: detection(pixel), point }));
+                let report = pixel.map(|pixel| Report { pixel, point });
+                seen.extend(report.map(|report| InView { camera: index as u32, feature, report }));
             }
         }
-        seen.sort_unstable_by_key(|seen| (seen.detection.camera, seen.detection.feature));
+        seen.sort_unstable_by_key(|seen| (seen.camera, seen.feature));
         seen
     }
 }

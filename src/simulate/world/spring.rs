@@ -40,6 +40,9 @@ pub struct Table {
 /// Steps per second of simulated time.
 const RATE: f64 = 500.0;
 
+/// More seconds than anybody pulls for.
+const LONGEST: f64 = 1e6;
+
 /// Below this speed friction grows with the speed, so that what sticks creeps [m/s].
 const CREEP: f64 = 1e-3;
 
@@ -81,7 +84,26 @@ impl SpringArm {
 
     /// Lets the spring pull for some seconds, its centre moving evenly from one place of the world to another [m]. Inertia is left out: the
     /// arm's brakes are taken to be stronger.
-    pub fn pull(&mut self, from: &Vector3<f64>, to: &Vector3<f64>, seconds: f64) {
+    ///
+    /// Errors: [`Error::Unusable`], and nothing moves, where a number is not finite, the seconds are below 0 or above a million, or forces
+    /// are too large for numbers.
+    pub fn pull(&mut self, from: &Vector3<f64>, to: &Vector3<f64>, seconds: f64) -> Result<(), Error> {
+        let is_finite = from.iter().chain(to).all(|x| x.is_finite());
+        if !is_finite || !(0.0..=LONGEST).contains(&seconds) {
+            let [from, to] = [from, to].map(|place| [place.x, place.y, place.z]);
+            return Err(Error::Unusable(format!(
+                "a spring's centre cannot go from {from:?} to {to:?} m in {seconds} s: places must be finite, and seconds from 0 to {LONGEST}"
+            )));
+        }
+        let before = self.joints.clone();
+        self.pull_on(from, to, seconds).inspect_err(|_| {
+            self.chain.posture(&before, &mut self.posture);
+            self.joints = before;
+        })
+    }
+
+    fn pull_on(&mut self, from: &Vector3<f64>, to: &Vector3<f64>, seconds: f64) -> Result<(), Error> {
+        let too_large = || Error::Unusable("the forces of a spring are too large for numbers".to_owned());
         let n = self.joints.len();
         let steps = (RATE * seconds).ceil().max(1.0);
         let h = seconds / steps;
@@ -106,8 +128,10 @@ impl SpringArm {
             let weighted = DMatrix::from_fn(3, n, |row, column| resistance[row] * slopes[(row, column)]);
             let system = slopes.transpose() * weighted + DMatrix::identity(n, n) * self.settings.damping;
             let pull = slopes.transpose() * DVector::from_column_slice(force.as_slice());
-            let Some(factor) = system.cholesky() else { return };
-            let speed = factor.solve(&pull);
+            let speed = system.cholesky().ok_or_else(too_large)?.solve(&pull);
+            if speed.iter().any(|speed| !speed.is_finite()) {
+                return Err(too_large());
+            }
             self.joints.iter_mut().zip(speed.iter()).for_each(|(joint, speed)| *joint += h * speed);
             let moved = &slopes * &speed;
             velocity = Vector3::new(moved[0], moved[1], moved[2]);
@@ -115,5 +139,6 @@ impl SpringArm {
         }
         let depth = |table: Table| table.stiffness * (table.height - self.tip().translation.z).max(0.0);
         self.contact = self.settings.table.map_or(0.0, depth);
+        Ok(())
     }
 }
