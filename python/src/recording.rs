@@ -88,6 +88,7 @@ impl Recording {
             frames,
             camera_topics: camera_topics.into_iter().flatten().collect(),
             join,
+            ..BagOptions::default()
         };
         let paths = match paths {
             Paths::One(path) => vec![path],

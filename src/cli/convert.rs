@@ -156,6 +156,7 @@ impl OfBags {
             pose_topic: self.pose_topic.clone(),
             frames: self.base_frame.clone().zip(self.tip_frame.clone()).map(|(base, tip)| [base, tip]),
             camera_topics: self.camera_topic.iter().map(camera).collect(),
+            cameras: Vec::new(),
             join: self.join,
         }
     }

@@ -5,7 +5,7 @@ use super::written::written;
 use clap::{Args, ValueEnum};
 use handeye::Error;
 use handeye::detect::{Folder, Gray, Pattern, detect_in_folders};
-use handeye::recording::{Bag, BagOptions, Format, Opened, Pairing, RecordedCamera, Recording};
+use handeye::recording::{Bag, BagOptions, Format, Found, Opened, Pairing, RecordedCamera, Recording};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -69,14 +69,13 @@ impl Detect {
         let cameras = self.camera.iter().map(|text| read_camera(text)).collect::<Result<Vec<_>, _>>()?;
         let bags = self.images.iter().filter(|image| Format::of(Path::new(image)) == Format::Bag).count();
         let (mut recording, mut notes) = match (bags, &self.images[..]) {
-            (0, _) => self.in_folders(&patterns)?,
-            (_, [bag]) if self.states.is_none() => in_bag(Path::new(bag), &patterns)?,
+            (0, _) => self.in_folders(&patterns, &cameras)?,
+            (_, [bag]) if self.states.is_none() => in_bag(Path::new(bag), &patterns, cameras)?,
             _ => {
                 let problem = "a bag goes alone, with the states that it has itself";
                 return Err(Error::Unusable(problem.to_owned()));
             }
         };
-        describe(&mut recording, &cameras)?;
         if recording.samples.is_empty() {
             return Err(Error::NotEnoughData(format!("no image shows {}", self.pattern.join(" or "))));
         }
@@ -117,7 +116,7 @@ impl Detect {
         Ok(patterns)
     }
 
-    fn in_folders(&self, patterns: &[Pattern]) -> Result<(Recording, Vec<String>), Error> {
+    fn in_folders(&self, patterns: &[Pattern], known: &[RecordedCamera]) -> Result<(Recording, Vec<String>), Error> {
         let mut folders = Vec::new();
         for image in &self.images {
             let named = image.split_once('=').filter(|_| !Path::new(image).exists());
@@ -133,40 +132,24 @@ impl Detect {
         };
         let rows = states.as_ref().map(|opened| (&opened.recording, &opened.images[..], pairing));
         let file = self.states.as_deref().unwrap_or(Path::new("images")).display();
-        let (recording, mut notes) = Recording::from_images(cameras, &seen, rows)
+        let (mut recording, mut notes) = Recording::from_images(cameras, &seen, rows)
             .map_err(|problem| Error::Unusable(format!("{file}: {problem}")))?;
+        recording.describe_cameras(known).map_err(|problem| Error::Unusable(format!("--camera: {problem}")))?;
         notes.extend(states.into_iter().flat_map(|Opened { notes, .. }| notes));
         Ok((recording, notes))
     }
 }
 
-fn in_bag(path: &Path, patterns: &[Pattern]) -> Result<(Recording, Vec<String>), Error> {
+fn in_bag(path: &Path, patterns: &[Pattern], cameras: Vec<RecordedCamera>) -> Result<(Recording, Vec<String>), Error> {
     let look = |bytes: &&[u8]| {
         let image = Gray::decode(bytes)?;
-        Ok(patterns.iter().flat_map(|pattern| pattern.detect(&image)).collect())
+        let features = patterns.iter().flat_map(|pattern| pattern.detect(&image)).collect();
+        Ok(Found { size: image.size(), features })
     };
     let mut detect = |images: &[&[u8]]| images.par_iter().map(look).collect::<Vec<Result<_, String>>>();
-    let options = BagOptions::default();
+    let options = BagOptions { cameras, ..BagOptions::default() };
     let Bag { recording, notes } = Bag::detect(path, &options, &mut detect)?;
     Ok((recording, notes))
-}
-
-/// Adds what the options know of the cameras.
-fn describe(recording: &mut Recording, cameras: &[RecordedCamera]) -> Result<(), Error> {
-    for known in cameras {
-        let name = &known.name;
-        let Some(camera) = recording.cameras.iter_mut().find(|camera| camera.name == *name) else {
-            return Err(Error::Unusable(format!("--camera {name}: there are no images of this camera")));
-        };
-        if let (Some(said), Some(size)) = (known.size, camera.size)
-            && said != size
-        {
-            let problem = format!("--camera {name}: is of {said:?} pixels, and its images are of {size:?}");
-            return Err(Error::Unusable(problem));
-        }
-        *camera = RecordedCamera { size: camera.size.or(known.size), ..known.clone() };
-    }
-    Ok(())
 }
 
 fn metres(text: &str) -> Result<f64, String> {

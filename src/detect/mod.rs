@@ -6,6 +6,7 @@ mod checkerboard;
 mod dark;
 mod folders;
 mod gray;
+mod names;
 mod quads;
 mod saddle;
 mod square;

@@ -38,7 +38,7 @@ impl Recording {
     /// are within half the time between two images of one camera; otherwise where they have one name. Without states, samples are in the order
     /// of `images`, whose names come in their order.
     ///
-    /// Returned are the recording and notes. Errors: what does not fit, in words.
+    /// Returned are the recording, without samples where no image shows anything, and notes. Errors: what does not fit, in words.
     pub fn from_images(
         cameras: Vec<RecordedCamera>,
         images: &[ImageSeen],
@@ -59,7 +59,12 @@ impl Recording {
             let stamp = match (by_time, image.time) {
                 (false, _) => places[image.name.as_str()],
                 (true, Some(time)) => (time * 1e9) as i64,
-                (true, None) => return Err(format!("the name of image `{}` is no time", image.name)),
+                (true, None) => {
+                    return Err(format!(
+                        "the name of image `{}` is no time, in seconds or as a count of ms, µs or ns since 1970 as all others are",
+                        image.name
+                    ));
+                }
             };
             let features = image.features.iter().map(|(name, pixel)| (features.intern(name), *pixel)).collect();
             stamped.push(Image { stamp, source: image.camera as usize, features });
@@ -75,7 +80,13 @@ impl Recording {
             None => groups.iter().map(|_| Sample::default()).collect(),
             Some((states, _, Pairing::Order)) => in_order(&groups, order.len(), states)?,
             Some((states, names, Pairing::Name)) => by_name(&groups, &order, states, names)?,
-            Some((states, _, Pairing::Time)) => at_times(&groups, states, &mut notes)?,
+            Some((states, _, Pairing::Time)) => {
+                let moments: Vec<Moment> = groups
+                    .iter()
+                    .map(|group| Moment { name: &images[group.images[0]].name, time: group.time })
+                    .collect();
+                at_times(&moments, states, &mut notes)?
+            }
         };
         let empty = rows.iter().map(|_| (None, None));
         let (mut samples, features, _) = assemble(&groups, &stamped, features, &camera_of_source, empty);
@@ -85,7 +96,13 @@ impl Recording {
             *sample = Sample { time, pixels, points, targets, ..row };
         }
         let joints = states.map_or_else(Vec::new, |(states, _, _)| states.joints.clone());
-        Ok((Recording { joints, cameras, features, samples }, notes))
+        let recording = Recording { joints, cameras, features, samples };
+        let recording = if recording.samples.is_empty() {
+            recording
+        } else {
+            recording.checked().map_err(|error| error.to_string())?
+        };
+        Ok((recording, notes))
     }
 }
 
@@ -129,9 +146,15 @@ fn by_name(groups: &[Group], order: &[&str], states: &Recording, names: &[String
     groups.iter().map(row).collect()
 }
 
+/// When images were taken [ns], and what the first of them is called.
+struct Moment<'a> {
+    name: &'a str,
+    time: i64,
+}
+
 /// Joints and poses at the times of the images, interpolated.
-fn at_times(groups: &[Group], states: &Recording, notes: &mut Vec<String>) -> Result<Vec<Sample>, String> {
-    let moments: Vec<i64> = groups.iter().map(|group| group.time).collect();
+fn at_times(images: &[Moment], states: &Recording, notes: &mut Vec<String>) -> Result<Vec<Sample>, String> {
+    let moments: Vec<i64> = images.iter().map(|image| image.time).collect();
     let mut joints: Track<Vec<f64>> = Track::new(moments.len());
     let mut poses: Track<Pose> = Track::new(moments.len());
     for sample in &states.samples {
@@ -144,25 +167,46 @@ fn at_times(groups: &[Group], states: &Recording, notes: &mut Vec<String>) -> Re
             poses.add(&moments, time, pose);
         }
     }
+    let spans = [joints.span(), poses.span()];
+    let (Some(first), Some(last)) =
+        (spans.iter().flatten().map(|span| span[0]).min(), spans.iter().flatten().map(|span| span[1]).max())
+    else {
+        return Err("no row has a time and joints or a pose".to_owned());
+    };
     let (joints, poses) = (joints.at(&moments), poses.at(&moments));
-    let gap = |gaps: Vec<Option<i64>>| gaps.into_iter().flatten().max().unwrap_or(0);
-    let largest = gap(joints.iter().map(|at| at.as_ref().map(|at| at.gap)).collect())
-        .max(gap(poses.iter().map(|at| at.as_ref().map(|at| at.gap)).collect()));
-    let outside = joints.iter().zip(&poses).filter(|(joints, pose)| joints.is_none() && pose.is_none()).count();
-    if outside == groups.len() {
-        let first = |times: &mut dyn Iterator<Item = f64>| times.next().unwrap_or(f64::NAN);
+    let seconds = |nanoseconds: i64| nanoseconds as f64 / 1e9;
+    let is_outside = |index: &usize| joints[*index].is_none() && poses[*index].is_none();
+    let off = |index: usize| (first.saturating_sub(moments[index])).max(moments[index].saturating_sub(last));
+    let outside: Vec<usize> = (0..images.len()).filter(is_outside).collect();
+    if outside.len() == images.len()
+        && let Some(&nearest) = outside.iter().min_by_key(|index| off(**index))
+    {
         return Err(format!(
-            "no image was taken while the robot was recorded: images begin at {} s, rows at {} s",
-            first(&mut moments.iter().map(|moment| *moment as f64 / 1e9)),
-            first(&mut states.samples.iter().filter_map(|sample| sample.time))
+            "no image was taken while the robot was recorded, from {} s to {} s: the nearest, `{}` of {} s, is {} s off",
+            seconds(first),
+            seconds(last),
+            images[nearest].name,
+            seconds(moments[nearest]),
+            seconds(off(nearest))
         ));
     }
-    if outside > 0 {
-        notes
-            .push(format!("{outside} of {} samples are outside of the time that the robot was recorded", groups.len()));
+    if let Some(&farthest) = outside.iter().max_by_key(|index| off(**index)) {
+        notes.push(format!(
+            "{} of {} samples are outside of the time that the robot was recorded, image `{}` by {} s",
+            outside.len(),
+            images.len(),
+            images[farthest].name,
+            seconds(off(farthest))
+        ));
     }
-    if largest > 0 {
-        notes.push(format!("states are interpolated, between two that are up to {:.6} s apart", largest as f64 / 1e9));
+    let gap = |index: usize| {
+        let [joints, pose] = [joints[index].as_ref().map(|at| at.gap), poses[index].as_ref().map(|at| at.gap)];
+        joints.max(pose).unwrap_or(0)
+    };
+    let widest = (0..images.len()).rev().max_by_key(|index| gap(*index)).filter(|index| gap(*index) > 0);
+    if let Some(widest) = widest {
+        let (name, apart) = (images[widest].name, seconds(gap(widest)));
+        notes.push(format!("states are interpolated, between two that are up to {apart:.6} s apart (image `{name}`)"));
     }
     let row = |(joints, pose): (Option<At<Vec<f64>>>, Option<At<Pose>>)| Sample {
         joints: joints.map(|at| at.value),

@@ -1,7 +1,9 @@
 //! Recordings: what was commanded, read and seen; one file per format.
 mod bag;
 mod checked;
+mod clock;
 mod command;
+mod describe;
 mod images;
 mod join;
 mod jsonl;
@@ -12,8 +14,10 @@ mod table;
 mod track;
 mod types;
 
-pub use bag::{Bag, BagOptions, Detect};
+pub use bag::{Bag, BagOptions, Detect, Found};
+pub(crate) use clock::unit_of_date;
 pub use command::Command;
+pub(crate) use describe::px;
 pub use images::{ImageSeen, Pairing};
 pub use jsonl::Reader;
 pub(crate) use names::natural_order;

@@ -421,10 +421,14 @@ fn compressed_images_in_a_bag_show_what_the_same_files_show() {
     assert!(said.contains("1 images are left out, the first of which is neither PNG nor JPEG"), "{said}");
     let bag = Recording::read(&folder.path().join("bag.jsonl")).unwrap();
     assert_eq!((&bag.features, bag.cameras[0].name.as_str()), (&files.features, "hand"));
-    assert_eq!(bag.samples.len(), 3);
-    for (index, (bag, file)) in bag.samples.iter().zip(&files.samples).enumerate() {
-        assert_eq!((bag.time, &bag.pixels), (Some(1.0 + index as f64), &file.pixels));
-    }
+    assert_eq!(bag.cameras[0].size, Some([SIZE[0] as u32, SIZE[1] as u32]));
+    let pixels =
+        |recording: &Recording| -> Vec<_> { recording.samples.iter().map(|sample| sample.pixels.clone()).collect() };
+    assert_eq!(pixels(&bag), pixels(&files));
+    let times: Vec<_> = bag.samples.iter().map(|sample| sample.time).collect();
+    assert_eq!(times, [Some(1.0), Some(2.0), Some(3.0)]);
+    let seen: Vec<usize> = bag.samples.iter().map(|sample| sample.pixels.len()).collect();
+    assert!(seen.iter().all(|seen| *seen >= 4), "{seen:?} of 6 corners");
     // Without a pattern there is nothing in it.
     let error = Bag::read(&folder.path().join("bag.mcap"), &BagOptions::default()).unwrap_err().to_string();
     assert!(error.contains("has no image with features") && error.contains("/hand/image_raw/compressed"), "{error}");
@@ -470,15 +474,72 @@ fn images_pair_with_rows_by_order_or_time_and_mistakes_are_named() {
     fails("nowhere --pattern tag36h11", &["nowhere"]);
     fails("left=shots --pattern tag36h11", &["shots: has no images"]);
     fails("shots --pattern tag36h11 --states rows.csv --pair name", &["rows.csv", "a column `image`"]);
-    fails("shots --pattern tag36h11 --camera top=1x1", &["--camera top: there are no images"]);
+    fails("shots --pattern tag36h11 --camera top=1x1", &["--camera: there are no images of a camera `top`"]);
     folder.write("two.csv", "time,joints.a\n1,1\n2,2\n");
     fails("shots --pattern tag36h11 --states two.csv", &["two.csv: there are 3 images of each camera and 2 rows"]);
     fails(
         "shots --pattern tag36h11 --states two.csv --pair time",
-        &["no image was taken while the robot was recorded"],
+        &[
+            "two.csv: no image was taken while the robot was recorded, from 1 s to 2 s",
+            "the nearest, `10.0` of 10 s, is 8 s off",
+        ],
+    );
+    folder.write("ends.csv", "time,joints.a\n9,1\n10.25,2\n");
+    let (said, _) = folder.expect(0, "detect shots --pattern tag36h11 --states ends.csv --pair time -o ends.jsonl");
+    assert!(
+        said.contains("2 of 3 samples are outside of the time that the robot was recorded, image `11.0` by 0.75 s"),
+        "{said}"
+    );
+    assert!(said.contains("up to 1.250000 s apart (image `10.0`)"), "{said}");
+    folder.write("back.csv", "time,joints.a\n9,1\n12,2\n11,2\n");
+    fails(
+        "shots --pattern tag36h11 --states back.csv --pair time",
+        &["back.csv:4:1: time goes back, from 12 s to 11 s"],
     );
     let (_, error) = folder.expect(1, "detect shots --pattern tag25h9 -o out.jsonl");
     assert!(error.contains("no image shows tag25h9"), "{error}");
+    std::fs::copy(folder.path().join("shots/left/10.0.png"), folder.path().join("shots/left/10.0.jpg")).unwrap();
+    fails(
+        "shots --pattern tag36h11",
+        &["10.0.jpg and shots/left/10.0.png: camera `left` has two images called `10.0`"],
+    );
+    std::fs::remove_file(folder.path().join("shots/left/10.0.jpg")).unwrap();
     folder.write("shots/left/12.0.png", "no image");
     fails("shots --pattern tag36h11", &["12.0.png: is neither PNG nor JPEG"]);
+}
+
+#[test]
+fn images_that_are_numbers_are_in_the_order_of_the_numbers() {
+    let folder = Folder::new("detect-numbers");
+    let rows = TAG36H11[0].1;
+    std::fs::create_dir_all(folder.path().join("left")).unwrap();
+    // As text 100 comes before 99, and as people count names 9.5 before 9.25.
+    for (index, name) in ["9.25", "9.5", "99", "100"].into_iter().enumerate() {
+        let mut rng = ChaCha8Rng::seed_from_u64(index as u64);
+        let image =
+            View::random(&mut rng, [0.1; 2], 0.5).render(|x, y| is_dark(&rows, 10.0 * x, 10.0 * y), 0.8, 2.0, &mut rng);
+        std::fs::write(folder.path().join(format!("left/{name}.png")), png(&image)).unwrap();
+    }
+    folder.write("rows.csv", "time,image,joints.a\n9.25,9.25.png,1\n9.5,9.5.png,2\n99,99.png,3\n100,100.png,4\n");
+    let joints = |how: &str| -> Vec<(f64, [f64; 2])> {
+        folder.expect(0, &format!("detect left --pattern tag36h11 --states rows.csv --pair {how} -o out.jsonl"));
+        let recording = Recording::read(&folder.path().join("out.jsonl")).unwrap();
+        recording.samples.iter().map(|sample| (sample.joints.as_ref().unwrap()[0], sample.pixels[0].pixel)).collect()
+    };
+    let order = joints("order");
+    assert_eq!(order.iter().map(|(joint, _)| *joint).collect::<Vec<_>>(), [1.0, 2.0, 3.0, 4.0]);
+    assert_eq!((&order, &order), (&joints("name"), &joints("time")));
+}
+
+#[test]
+fn a_size_for_a_camera_leaves_what_is_known_of_its_images() {
+    let folder = Folder::new("detect-camera");
+    hand_eye(&folder, 1);
+    let pattern = "charuco=4x3:DICT_5X5_50:0.75";
+    let size = format!("hand={}x{}", SIZE[0], SIZE[1]);
+    folder.expect(0, &format!("detect shots --pattern {pattern} --camera hand=hand.yaml --camera {size} -o out.jsonl"));
+    let camera = &Recording::read(&folder.path().join("out.jsonl")).unwrap().cameras[0];
+    assert_eq!((camera.size, camera.fx), (Some([SIZE[0] as u32, SIZE[1] as u32]), Some(FOCAL)));
+    let (_, error) = folder.expect(2, &format!("detect shots --pattern {pattern} --camera hand=8x6 -o out.jsonl"));
+    assert!(error.contains("said to be of 8 x 6 px, and its images are of 320 x 240 px"), "{error}");
 }

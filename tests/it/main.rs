@@ -1,5 +1,6 @@
 //! What users are promised, one file per promise.
 mod bag;
+mod bag_cameras;
 mod bag_kinds;
 mod calibration;
 mod cli;
@@ -23,6 +24,7 @@ mod infer_rigs;
 mod influence;
 mod intrinsics;
 mod learning;
+mod lerobot;
 mod malformed_input;
 mod monitor;
 mod not_enough;

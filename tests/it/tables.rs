@@ -1,16 +1,10 @@
-//! Recordings in tables: CSV, and Parquet as LeRobot writes it.
+//! Recordings in tables: CSV.
 use crate::cli::Folder;
-use handeye::recording::{Actions, Angles, Recording, Sample, Table, TableOptions};
+use handeye::recording::{Angles, Recording, Sample, Table, TableOptions};
 use handeye::rig::catalog;
 use handeye::simulate::{SimulateOptions, simulate};
-use parquet::data_type::{DoubleType, FloatType, Int64Type};
-use parquet::file::properties::WriterProperties;
-use parquet::file::writer::SerializedFileWriter;
-use parquet::schema::parser::parse_message_type;
 use std::f64::consts::PI;
 use std::fmt::Write as _;
-use std::path::Path;
-use std::sync::Arc;
 
 fn csv(folder: &Folder, text: &str, options: &TableOptions) -> Result<Table, handeye::Error> {
     folder.write("table.csv", text);
@@ -178,6 +172,22 @@ fn mistakes_in_a_table_are_named_with_line_and_column() {
             "pose.x,pose.y,pose.z,pose.qx,pose.qy,pose.qz,pose.qw\n0,0,0,0,0,0,0\n",
             "table.csv:2:7: a quaternion of length 0",
         ),
+        (
+            "joints.a,pose.x,pose.y,pose.z,pose.qx,pose.qy,pose.qz,pose.qw\n0,0,0,0,0,0,0,1\n0,0,0,0,0,0,0,\n",
+            "table.csv:3:15: this is empty",
+        ),
+        (
+            "joints.a,pose_action.x,pose_action.y,pose_action.z,pose_action.roll,pose_action.pitch,pose_action.yaw\n0,0,,0,0,0,0\n",
+            "table.csv:2:5: this is empty",
+        ),
+        (
+            "joints.a,left.tag.x,left.tag.y,left.tag.z,left.tag.roll,left.tag.pitch,left.tag.yaw\n0,0,0,0,nan,0,0\n",
+            "table.csv:2:9: this is empty",
+        ),
+        ("time,joints.a\n0,1\n1,1\n0.5,1\n", "table.csv:4:1: time goes back, from 1 s to 0.5 s"),
+        ("time,joints.a\n1,1\n1700000000000000000,1\n", "table.csv:3:1: 1700000000000000000 s is no time"),
+        ("time,joints.a\n123456789012,1\n", "table.csv:2:1: 123456789012 s is no time"),
+        ("time_s,joints.a\n1700000000000000000,1\n", "table.csv:2:1: 1700000000000000000 s is no time"),
         ("joints.tip\n0\n", "table.csv:1:1: a joint cannot be called `tip`"),
         ("joints.a,joint_action.b\n0,1\n", "table.csv:1:10: there is `joint_action.b`, and no `joint_action.a`"),
     ];
@@ -190,115 +200,42 @@ fn mistakes_in_a_table_are_named_with_line_and_column() {
     assert!(error.contains("table.csv:3:1: this is no UTF-8"), "{error}");
 }
 
-/// A dataset as LeRobot lays it out: two episodes of three frames, degrees, names in `meta/info.json`.
-fn dataset(folder: &Path, names: &str, codec: parquet::basic::Compression) {
-    let schema = "message schema {
-        optional group observation.state (LIST) { repeated group list { optional float element; } }
-        optional group action (LIST) { repeated group list { optional float element; } }
-        optional float timestamp;
-        optional int64 frame_index;
-        optional int64 episode_index;
-        optional double observation.note;
-    }";
-    std::fs::create_dir_all(folder.join("data/chunk-000")).unwrap();
-    std::fs::create_dir_all(folder.join("meta")).unwrap();
-    let info = format!(
-        "{{\"codebase_version\":\"v3.0\",\"fps\":10,\"features\":{{\"observation.state\":{{\"dtype\":\"float32\",\"shape\":[2],\"names\":{names}}},\
-        \"action\":{{\"dtype\":\"float32\",\"shape\":[2],\"names\":{names}}},\
-        \"observation.images.front\":{{\"dtype\":\"video\",\"shape\":[480,640,3],\"names\":[\"height\",\"width\",\"channels\"]}}}}}}"
-    );
-    std::fs::write(folder.join("meta/info.json"), info).unwrap();
-    let schema = Arc::new(parse_message_type(schema).unwrap());
-    let properties = Arc::new(WriterProperties::builder().set_compression(codec).build());
-    let file = std::fs::File::create(folder.join("data/chunk-000/file-000.parquet")).unwrap();
-    let mut writer = SerializedFileWriter::new(file, schema, properties).unwrap();
-    for episode in 0..2 {
-        let base = 10.0 * episode as f32;
-        let mut group = writer.next_row_group().unwrap();
-        for (values, add) in [(&[0.1_f32, 45.0, 1.0, 46.0, 2.0, 47.0], 0.0), (&[1.0, 46.0, 2.0, 47.0, 3.0, 48.0], 0.5)]
-        {
-            let values: Vec<f32> = values.iter().map(|value| value + base + add).collect();
-            let mut column = group.next_column().unwrap().unwrap();
-            column.typed::<FloatType>().write_batch(&values, Some(&[3; 6]), Some(&[0, 1, 0, 1, 0, 1])).unwrap();
-            column.close().unwrap();
-        }
-        let mut column = group.next_column().unwrap().unwrap();
-        column.typed::<FloatType>().write_batch(&[0.0, 0.1, 0.2], Some(&[1; 3]), None).unwrap();
-        column.close().unwrap();
-        for numbers in [[0, 1, 2], [episode; 3]] {
-            let mut column = group.next_column().unwrap().unwrap();
-            column.typed::<Int64Type>().write_batch(&numbers, Some(&[1; 3]), None).unwrap();
-            column.close().unwrap();
-        }
-        let mut column = group.next_column().unwrap().unwrap();
-        column.typed::<DoubleType>().write_batch(&[5.0], Some(&[0, 1, 0]), None).unwrap();
-        column.close().unwrap();
-        group.close().unwrap();
+#[test]
+fn times_that_are_dates_in_another_unit_are_converted_and_that_is_said() {
+    let folder = Folder::new("tables-units");
+    for (name, unit, is_said) in [
+        ("time", 1e9, true),
+        ("timestamp", 1e6, true),
+        ("t", 1e3, true),
+        ("time", 1.0, false),
+        ("time_ns", 1e9, false),
+        ("timestamp_ms", 1e3, false),
+    ] {
+        let start = 1_700_000_000.0 * unit;
+        let text = format!("{name},joints.a\n{start:.0},0.5\n{:.0},0.6\n", start + 10.0 * unit);
+        let Table { recording, notes, .. } = csv(&folder, &text, &TableOptions::default()).unwrap();
+        let [first, second] = [0, 1].map(|row| recording.samples[row].time.unwrap());
+        assert!(
+            (first - 1.7e9).abs() < 1e-6 && (second - first - 10.0).abs() < 1e-6,
+            "{name}, {unit}: {first} {second}"
+        );
+        let said = notes.iter().any(|note| note.contains("since 1970"));
+        assert_eq!(said, is_said, "{name}, {unit}: {notes:?}");
     }
-    writer.close().unwrap();
+    // Nanoseconds of a clock that begins with the recording show in nothing but the time between rows.
+    let Table { notes, .. } = csv(&folder, "t,joints.a\n0,0.5\n100000000,0.6\n", &TableOptions::default()).unwrap();
+    assert!(notes.iter().any(|note| note.contains("up to 100000000 s apart")), "{notes:?}");
 }
 
 #[test]
-fn a_lerobot_dataset_is_read_with_the_names_of_its_motors_and_degrees_where_they_are_said() {
-    let folder = Folder::new("tables-lerobot");
-    use parquet::basic::{Compression, ZstdLevel};
-    let codecs = [Compression::UNCOMPRESSED, Compression::SNAPPY, Compression::ZSTD(ZstdLevel::default())];
-    let names = ["[\"pan.pos\",\"lift.pos\"]", "{\"motors\":[\"pan\",\"lift\"]}"];
-    for (codec, names) in codecs.into_iter().zip(names.into_iter().cycle()) {
-        dataset(folder.path(), names, codec);
-        let file = folder.path().join("data/chunk-000/file-000.parquet");
-        let options =
-            TableOptions { angles: Angles::Degrees(Vec::new()), actions: Actions::Targets, ..TableOptions::default() };
-        let Table { recording, notes, .. } = Table::read_parquet(&file, &options).unwrap();
-        assert_eq!(recording.joints, ["pan", "lift"]);
-        assert_eq!(recording.samples.len(), 6);
-        let times: Vec<f64> = recording.samples.iter().map(|sample| sample.time.unwrap()).collect();
-        // 0.1 in 32 bits is 0.1, not 0.10000000149; the second episode goes on a second later.
-        assert!(times.iter().zip([0.0, 0.1, 0.2, 1.2, 1.3, 1.4]).all(|(a, b)| (a - b).abs() < 1e-12), "{times:?}");
-        let first = &recording.samples[0];
-        let expected = [0.1 * (PI / 180.0), 45.0 * (PI / 180.0)];
-        assert!(first.joints.as_ref().unwrap().iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15));
-        // From 1 to 2.5 degrees, and what is commanded last leads nowhere.
-        let action = recording.samples[1].joint_action.as_ref().unwrap();
-        assert!((action[0] - 1.5 * PI / 180.0).abs() < 1e-15, "{action:?}");
-        assert!(recording.samples[2].joint_action.is_none());
-        let said = notes.join("\n");
-        assert!(said.contains("times begin anew 1 times") && said.contains("observation.note"), "{said}");
-
-        let options = TableOptions { episodes: vec![1], angles: Angles::Radians, ..TableOptions::default() };
-        let Table { recording, notes, .. } = Table::read_lerobot(folder.path(), &options).unwrap();
-        let joints: Vec<_> = recording.samples.iter().map(|sample| sample.joints.clone().unwrap()[1]).collect();
-        assert_eq!(joints, [55.0, 56.0, 57.0]);
-        assert!(notes.iter().any(|note| note.contains("actions are left out")), "{notes:?}");
-
-        let error = Table::read_parquet(&file, &TableOptions::default()).unwrap_err().to_string();
-        assert!(error.contains("row 1, column `joints.lift`: 45 is more than two turns"), "{error}");
-    }
-    let (said, _) = folder.expect(0, "convert . --degrees --joints lift,pan --episodes 0 -o out.jsonl");
-    assert!(said.contains("3 samples of 2 joints"), "{said}");
-    assert_eq!(Recording::read(&folder.path().join("out.jsonl")).unwrap().joints, ["lift", "pan"]);
-    let (_, error) = folder.expect(2, "convert . --degrees --joint-topic /a -o out.jsonl");
-    assert!(error.contains("--joint-topic has no effect"), "{error}");
-    let (_, error) = folder.expect(2, "convert . --degrees=elbow -o out.jsonl");
-    assert!(error.contains("no joint `elbow`"), "{error}");
-}
-
-#[test]
-fn a_parquet_file_that_is_damaged_anywhere_is_refused_or_read_and_ends_no_program() {
-    let folder = Folder::new("tables-damaged");
-    dataset(folder.path(), "[\"pan\",\"lift\"]", parquet::basic::Compression::UNCOMPRESSED);
-    let path = folder.path().join("data/chunk-000/file-000.parquet");
-    let whole = std::fs::read(&path).unwrap();
-    let options = TableOptions { angles: Angles::Radians, ..TableOptions::default() };
-    for end in (0..whole.len()).step_by(97) {
-        std::fs::write(&path, &whole[..end]).unwrap();
-        let error = Table::read_parquet(&path, &options).unwrap_err();
-        assert!(error.is_input() && error.to_string().contains("file-000.parquet"), "cut at {end}: {error}");
-    }
-    for place in (0..whole.len()).step_by(11) {
-        let mut broken = whole.clone();
-        broken[place] ^= 0x5a;
-        std::fs::write(&path, &broken).unwrap();
-        let _ = Table::read_parquet(&path, &options);
-    }
+fn a_table_is_held_to_what_a_recording_file_is_held_to() {
+    let folder = Folder::new("tables-checked");
+    let text = "joints.a,joint_action.a,left.f.u,left.f.v\n0,0.5,1,2\n0.5,0.5,1,2\n";
+    let Table { recording, .. } = csv(&folder, text, &TableOptions::default()).unwrap();
+    // What is commanded last leads nowhere.
+    let actions: Vec<_> = recording.samples.iter().map(|sample| sample.joint_action.clone()).collect();
+    assert_eq!(actions, [Some(vec![0.5]), None]);
+    let mut text = Vec::new();
+    recording.write_to(&mut text).unwrap();
+    assert_eq!(Recording::read_from(&text[..], "text").unwrap(), recording);
 }

@@ -3,9 +3,10 @@ use super::cameras::Info;
 use super::kinds::{Kind, features, frame, need, stamp};
 use super::messages::{Channel, Visitor};
 use super::topics::{Topic, is_topic};
-use super::{BagOptions, Detect};
+use super::{BagOptions, Detect, Found};
 use crate::Error;
 use crate::recording::names::Names;
+use crate::recording::px;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -21,6 +22,9 @@ pub(in crate::recording) struct Image {
 
 /// A topic (by index) and a frame: images of one camera.
 pub(super) type Source = (usize, String);
+
+/// A CameraInfo, or why it is none: that matters where it is of images.
+type Said = Result<Info, Error>;
 
 /// A PNG or JPEG, and where it belongs.
 struct Pending {
@@ -40,7 +44,9 @@ pub(super) struct Images<'a> {
     pub images: Vec<Image>,
     pub features: Names,
     pub sources: Vec<Source>,
-    pub infos: BTreeMap<Source, Info>,
+    /// The size of each source's images, where they were looked at.
+    pub sizes: BTreeMap<usize, [u32; 2]>,
+    pub infos: BTreeMap<Source, Said>,
     /// Pixels that are no numbers.
     pub not_finite: usize,
     /// Looks for features in images; where it is not given, those of detectors' messages are taken.
@@ -59,6 +65,7 @@ impl<'a> Images<'a> {
             images: Vec::new(),
             features: Names::default(),
             sources: Vec::new(),
+            sizes: BTreeMap::new(),
             infos: BTreeMap::new(),
             not_finite: 0,
             detect,
@@ -68,21 +75,32 @@ impl<'a> Images<'a> {
     }
 
     /// Looks at the images that wait, and says how many could not be looked at so far.
-    pub(super) fn finish(&mut self) -> Option<String> {
-        self.look();
+    pub(super) fn finish(&mut self) -> Result<Option<String>, Error> {
+        self.look()?;
         let (count, why) = &self.undecoded;
-        (*count > 0).then(|| format!("{count} images are left out, the first of which {why}"))
+        Ok((*count > 0).then(|| format!("{count} images are left out, the first of which {why}")))
     }
 
-    fn look(&mut self) {
-        let Some(detect) = &mut self.detect else { return };
+    /// Errors: [`Error::Unusable`] for an image of another size than those before it.
+    fn look(&mut self) -> Result<(), Error> {
+        let Some(detect) = &mut self.detect else { return Ok(()) };
         let pending = std::mem::take(&mut self.pending);
         let bytes: Vec<&[u8]> = pending.iter().map(|image| image.bytes.as_slice()).collect();
         let found = detect(&bytes);
         for (Pending { stamp, source, .. }, found) in pending.iter().zip(found) {
             match found {
-                Ok(seen) => {
-                    let features = seen.iter().map(|(name, pixel)| (self.features.intern(name), *pixel)).collect();
+                Ok(Found { size, features }) => {
+                    let known = *self.sizes.entry(*source).or_insert(size);
+                    if known != size {
+                        let (file, topic) = (self.path.display(), &self.topics[self.sources[*source].0].name);
+                        let seconds = *stamp as f64 / 1e9;
+                        return Err(Error::Unusable(format!(
+                            "{file}: {topic}: the image of {seconds:.6} s is of {}, and those before are of {}",
+                            px(size),
+                            px(known)
+                        )));
+                    }
+                    let features = features.iter().map(|(name, pixel)| (self.features.intern(name), *pixel)).collect();
                     self.images.push(Image { stamp: *stamp, source: *source, features });
                 }
                 Err(why) => {
@@ -93,6 +111,7 @@ impl<'a> Images<'a> {
                 }
             }
         }
+        Ok(())
     }
 
     fn is_meant(&self, topic: &str) -> bool {
@@ -126,7 +145,7 @@ impl Visitor for Images<'_> {
                 let source = self.source(channel, &frame);
                 self.pending.push(Pending { stamp, source, bytes });
                 if self.pending.len() >= TOGETHER {
-                    self.look();
+                    self.look()?;
                 }
             }
             Some(kind) if kind.is_of_images() && self.detect.is_none() && self.is_meant(&topic.name) => {
@@ -142,9 +161,12 @@ impl Visitor for Images<'_> {
                 self.images.push(Image { stamp, source, features });
             }
             Some(Kind::CameraInfo) => {
-                let (frame, info) = topic
-                    .decode(self.path, time, data, |message| Ok((frame(message).to_owned(), Info::read(message)?)))?;
-                self.infos.entry((channel, frame)).or_insert(info);
+                let mut of = String::new();
+                let info = topic.decode(self.path, time, data, |message| {
+                    frame(message).clone_into(&mut of);
+                    Info::read(message)
+                });
+                self.infos.entry((channel, of)).or_insert(info);
             }
             _ => {}
         }

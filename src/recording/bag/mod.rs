@@ -15,7 +15,7 @@ mod value;
 
 use super::names::Names;
 use super::track::At;
-use super::{Detection, Recording, Sample};
+use super::{Detection, RecordedCamera, Recording, Sample};
 use crate::Error;
 use handeye_solvers::Pose;
 pub(super) use images::Image;
@@ -41,6 +41,8 @@ pub struct BagOptions {
     pub frames: Option<[String; 2]>,
     /// Topics of detections, with the name of the camera where it is not that of the frame; empty: all.
     pub camera_topics: Vec<(String, Option<String>)>,
+    /// What is known of the cameras, by name: a lens replaces what the bag says of it.
+    pub cameras: Vec<RecordedCamera>,
     /// Images of several cameras at most this far apart make one sample [s]; `None`: half the time between two images.
     pub join: Option<f64>,
 }
@@ -54,8 +56,17 @@ pub struct Bag {
     pub notes: Vec<String>,
 }
 
-/// Looks for features in PNG or JPEG images: of each their names and pixels, or why it cannot be looked at, in words.
-pub type Detect<'a> = dyn FnMut(&[&[u8]]) -> Vec<Result<Vec<(String, [f64; 2])>, String>> + 'a;
+/// What was found in an image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// Its width and height [px].
+    pub size: [u32; 2],
+    /// Names and pixels of features.
+    pub features: Vec<(String, [f64; 2])>,
+}
+
+/// Looks for features in PNG or JPEG images; of each what it shows, or why it cannot be looked at, in words.
+pub type Detect<'a> = dyn FnMut(&[&[u8]]) -> Vec<Result<Found, String>> + 'a;
 
 impl Bag {
     /// Reads an MCAP file.
@@ -83,8 +94,8 @@ fn read<'a>(path: &'a Path, options: &'a BagOptions, detect: Option<&'a mut Dete
     };
     let mut images = Images::new(path, options, detect);
     let problem = messages::visit(path, &mut images)?;
-    let mut notes: Vec<String> = problem.into_iter().chain(images.finish()).collect();
-    let (cameras, camera_of_source) = cameras::cameras(&images.sources, &images.infos, &images.topics, options);
+    let mut notes: Vec<String> = problem.into_iter().chain(images.finish()?).collect();
+    let (cameras, camera_of_source) = cameras::cameras(path, &mut images, options)?;
     let within = options.join.map(|seconds| (seconds * 1e9) as i64);
     let groups = groups(&images.images, &camera_of_source, within);
     if groups.is_empty() {
@@ -145,7 +156,11 @@ fn read<'a>(path: &'a Path, options: &'a BagOptions, detect: Option<&'a mut Dete
         notes.push(format!("{twice} detections are of a feature that the same image has already, and are left out"));
     }
     let joints = names.iter().map(|name| tidy(name)).collect();
-    Ok(Bag { recording: Recording { joints, cameras, features, samples }, notes })
+    let mut recording = Recording { joints, cameras, features, samples };
+    let file = path.display().to_string();
+    let described = recording.describe_cameras(&options.cameras);
+    described.map_err(|problem| Error::Unusable(format!("{file}: {problem}")))?;
+    Ok(Bag { recording: recording.checked_as(&file)?, notes })
 }
 
 /// The samples, the features that they count by, and how many detections of a feature that its image had already were left out.

@@ -58,6 +58,11 @@ impl Topic {
         let image = name.strip_suffix("/compressed").unwrap_or(name);
         image.rsplit_once('/').map_or("", |(namespace, _)| namespace)
     }
+
+    /// True for `/left/image_rect`, `/left/image_rect_color/compressed` and what else stands below such a name: images without distortion.
+    pub(super) fn is_rectified(&self) -> bool {
+        self.name.split('/').any(|part| part.starts_with("image_rect"))
+    }
 }
 
 /// What there is, for messages about what there is not.

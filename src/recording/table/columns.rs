@@ -1,5 +1,7 @@
 //! What the columns of a table are, by their names.
+use super::{Actions, TableOptions};
 use crate::error::suggestion;
+use crate::recording::clock::UNITS;
 use crate::recording::names::{Names, natural_order};
 use crate::rig::{problem_of_joint_name, problem_of_name};
 use std::collections::BTreeMap;
@@ -7,16 +9,17 @@ use std::collections::BTreeMap;
 /// Where in a row each thing stands.
 #[derive(Debug, Default)]
 pub(super) struct Columns {
-    /// With the seconds that one of its units takes.
-    pub time: Option<(usize, f64)>,
+    pub time: Option<Time>,
     pub episode: Option<usize>,
     /// Names of the joints, from base to tip.
     pub joint_names: Vec<String>,
     /// One per joint, or none at all.
     pub joints: Vec<Angle>,
     pub joint_action: Vec<Angle>,
-    /// What `action.NAME` says, which may be a target or a motion.
+    /// What `action.NAME` says, where the options say whether that is a target or a motion.
     pub action: Vec<Angle>,
+    /// Names in `action.NAME`.
+    pub actions: Vec<String>,
     pub pose: Option<PoseColumns>,
     pub pose_action: Option<PoseColumns>,
     pub cameras: Vec<String>,
@@ -27,6 +30,14 @@ pub(super) struct Columns {
     pub targets: Vec<(u32, String, PoseColumns)>,
     /// Columns that say nothing that is known, by name.
     pub others: Vec<String>,
+}
+
+/// The column of times.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Time {
+    pub column: usize,
+    /// The seconds that one of its units takes, where its name says it.
+    pub unit: Option<f64>,
 }
 
 /// The column of a joint, and whether its name says that it is in degrees.
@@ -62,10 +73,10 @@ pub(super) enum Turn {
 
 /// Names of times, without their units.
 const TIMES: &[&str] = &["time", "timestamp", "t"];
-/// Units of times [s].
-const UNITS: &[(&str, f64)] = &[("_s", 1.0), ("_ms", 1e-3), ("_us", 1e-6), ("_ns", 1e-9)];
 /// What LeRobot counts by, which says nothing of a robot.
 const COUNTERS: &[&str] = &["frame_index", "index", "task_index", "sample", "frame"];
+/// What names of LeRobot's columns begin with, of which none is a camera.
+const FOREIGN: &[&str] = &["observation", "next", "annotation", "action"];
 /// What a column of names of images is called.
 pub(super) const IMAGES: &[&str] = &["image", "file", "filename"];
 const ORIGIN: [&str; 3] = ["x", "y", "z"];
@@ -76,9 +87,9 @@ const ROLL_PITCH_YAW: [&str; 3] = ["roll", "pitch", "yaw"];
 pub(super) type Problem = (usize, String);
 
 impl Columns {
-    /// Reads the header. `joints`: names of the joints from base to tip; empty: `known` where the table has all of them, or all
-    /// `joints.NAME` in their order.
-    pub(super) fn new(header: &[String], joints: &[String], known: &[String]) -> Result<Columns, Problem> {
+    /// Reads the header. Joints are those of the options; or those that they know where the table has all of them, or all `joints.NAME` in
+    /// their order.
+    pub(super) fn new(header: &[String], options: &TableOptions) -> Result<Columns, Problem> {
         let mut columns = Columns::default();
         let mut met: BTreeMap<&str, usize> = BTreeMap::new();
         let mut named_joints = Group::default();
@@ -97,7 +108,7 @@ impl Columns {
                 if columns.time.is_some() {
                     return Err((index, format!("`{name}` is a second column of times")));
                 }
-                columns.time = Some((index, unit));
+                columns.time = Some(Time { column: index, unit });
                 continue;
             }
             match name.split('.').collect::<Vec<_>>()[..] {
@@ -107,6 +118,7 @@ impl Columns {
                 ["joint_action", joint] => joint_action.add(index, joint)?,
                 ["action", joint] => action.add(index, joint)?,
                 [pose @ ("pose" | "pose_action"), part] => poses.entry(pose).or_default().add(index, part)?,
+                [first, ..] if FOREIGN.contains(&first) => columns.others.push(name.to_owned()),
                 [camera, feature, part] => {
                     if let Some(problem) = problem_of_name(camera).or_else(|| problem_of_name(feature)) {
                         return Err((index, problem));
@@ -116,9 +128,12 @@ impl Columns {
                 _ => columns.others.push(name.to_owned()),
             }
         }
-        columns.take_joints(header, &named_joints, joints, known)?;
+        columns.take_joints(header, &named_joints, &options.joints, &options.known_joints)?;
         columns.joint_action = columns.in_order(&joint_action, "joint_action")?;
-        columns.action = columns.in_order(&action, "action")?;
+        columns.actions = action.0.iter().map(|(name, _)| name.clone()).collect();
+        if options.actions != Actions::Unsaid {
+            columns.action = columns.in_order(&action, "action")?;
+        }
         for (name, parts) in poses {
             let pose = parts.pose(name)?;
             *(if name == "pose" { &mut columns.pose } else { &mut columns.pose_action }) = Some(pose);
@@ -141,7 +156,7 @@ impl Columns {
         let seen = self.pixels.iter().flat_map(|(_, _, at)| at).chain(self.points.iter().flat_map(|(_, _, at)| at));
         let targets = self.targets.iter().map(|(_, _, pose)| pose);
         let poses = self.pose.iter().chain(&self.pose_action).chain(targets).flat_map(PoseColumns::columns);
-        let single = self.time.map(|(column, _)| column).into_iter().chain(self.episode);
+        let single = self.time.map(|time| time.column).into_iter().chain(self.episode);
         for column in angles.chain(seen.copied()).chain(poses).chain(single) {
             wanted[column] = true;
         }
@@ -287,13 +302,13 @@ impl<'a> Parts<'a> {
     }
 }
 
-/// The seconds that one unit of a column of times takes; `None` of any other column.
-fn unit_of_time(name: &str) -> Option<f64> {
+/// The unit of a column of times, where its name says it [s]; `None` of any other column.
+fn unit_of_time(name: &str) -> Option<Option<f64>> {
     let of_time = |name: &str| TIMES.contains(&name);
-    let unit = UNITS.iter().find_map(|(suffix, unit)| Some((name.strip_suffix(suffix)?, *unit)));
+    let unit = UNITS.iter().find_map(|(_, suffix, unit)| Some((name.strip_suffix(suffix)?, *unit)));
     match unit {
-        _ if of_time(name) => Some(1.0),
-        Some((name, unit)) if of_time(name) => Some(unit),
+        _ if of_time(name) => Some(None),
+        Some((name, unit)) if of_time(name) => Some(Some(unit)),
         _ => None,
     }
 }

@@ -11,10 +11,13 @@
 //! | `CAMERA.FEATURE.x` `.y` `.z` | point in the camera's frame |
 //! | `CAMERA.TARGET.x` … `.qw` | pose of a target in the camera's frame |
 //!
-//! LeRobot's `observation.state` are joints, by the names in `meta/info.json`; `action` are targets of joints. What is empty, null or not a
-//! number was not measured.
+//! Times without a unit are seconds, or what makes them dates of this century, which is said. LeRobot's `observation.state` are joints, by the names
+//! in `meta/info.json`; `action.NAME` are targets or motions of the joints of the same names, which the options say; where the numbers of `action`
+//! have no names, they are of the joints in their order. Its images and whatever else begins with `observation.` or `next.` are passed over. What is
+//! empty, null or not a number was not measured.
 mod columns;
 mod csv;
+mod dataset;
 mod lerobot;
 mod parquet;
 mod samples;
@@ -96,17 +99,8 @@ impl Table {
     /// Errors: those of [`Table::read_parquet`], and [`Error::Unusable`] for a folder that is no dataset.
     pub fn read_lerobot(folder: &Path, options: &TableOptions) -> Result<Table, Error> {
         let files = lerobot::files(folder)?;
-        let mut notes = Vec::new();
-        let recording = Recording::read_all_with(&files, &mut |file| {
-            let table = Table::read_parquet(file, options)?;
-            for note in table.notes {
-                if !notes.contains(&note) {
-                    notes.push(note);
-                }
-            }
-            Ok(table.recording)
-        })?;
-        Ok(Table { recording, images: Vec::new(), notes })
+        let info = lerobot::Info::find(&files[0])?;
+        samples::read(dataset::Dataset::open(folder, files, &info)?, options, &info.cameras)
     }
 }
 
@@ -121,6 +115,21 @@ trait Rows {
     /// The name of the image that belongs to the row that was read last, without folder and ending, where there is such a column.
     fn image(&self) -> Option<&str> {
         None
+    }
+
+    /// True where the numbers in a column are seconds, whatever its name says.
+    fn is_in_seconds(&self, _column: usize) -> bool {
+        false
+    }
+
+    /// What there is beside columns of numbers.
+    fn left_out(&self) -> &[String] {
+        &[]
+    }
+
+    /// What has to be said of the names of its columns.
+    fn notes(&self) -> &[String] {
+        &[]
     }
 
     /// A problem with a column of the row that was read last, or of the header before any.
