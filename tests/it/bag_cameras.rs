@@ -2,7 +2,7 @@
 use crate::bag::cdr::Cdr;
 use crate::cli::Folder;
 use handeye::camera::CameraModel;
-use handeye::recording::{Bag, BagOptions, Found, RecordedCamera};
+use handeye::recording::{Found, OpenOptions, Opened, RecordedCamera, Recording};
 use mcap::WriteOptions;
 use mcap::records::MessageHeader;
 use std::collections::BTreeMap;
@@ -49,9 +49,9 @@ fn image(topic: &'static str, frame: &str, second: u32) -> Message {
 fn detect(
     folder: &Folder,
     messages: Vec<Message>,
-    options: &BagOptions,
+    options: &OpenOptions,
     size: impl Fn(u8) -> [u32; 2],
-) -> Result<Bag, handeye::Error> {
+) -> Result<Opened, handeye::Error> {
     let mut writer = WriteOptions::new().create(Cursor::new(Vec::new())).unwrap();
     for (time, (topic, kind, text, cdr)) in messages.iter().enumerate() {
         let schema = writer.add_schema(kind, "ros2msg", text.as_bytes()).unwrap();
@@ -63,7 +63,7 @@ fn detect(
     let path = folder.path().join("bag.mcap");
     std::fs::write(&path, writer.into_inner().into_inner()).unwrap();
     let look = |bytes: &&[u8]| Ok(Found { size: size(bytes[0]), features: vec![("f0".to_owned(), [1.0, 2.0])] });
-    Bag::detect(&path, options, &mut |images: &[&[u8]]| images.iter().map(look).collect())
+    Recording::detect_with(&path, options, &mut |images: &[&[u8]]| images.iter().map(look).collect())
 }
 
 fn lens(camera: &RecordedCamera) -> [Option<f64>; 4] {
@@ -78,7 +78,7 @@ fn rectified_images_have_the_lens_of_the_projection_matrix_and_others_that_of_th
     let folder = Folder::new("bag-rectified");
     let read = |topic: &'static str| {
         let messages = vec![info("/left/camera_info", "left", 0), image(topic, "left", 1)];
-        let bag = detect(&folder, messages, &BagOptions::default(), |_| [640, 480]).unwrap();
+        let bag = detect(&folder, messages, &OpenOptions::default(), |_| [640, 480]).unwrap();
         bag.recording.cameras[0].clone()
     };
     for topic in ["/left/image_raw/compressed", "/left/compressed"] {
@@ -93,7 +93,7 @@ fn rectified_images_have_the_lens_of_the_projection_matrix_and_others_that_of_th
     }
     let both = ["/left/image_raw/compressed", "/left/image_rect/compressed"];
     let messages = both.map(|topic| image(topic, "left", 1)).into_iter().chain([info("/left/camera_info", "left", 0)]);
-    let error = detect(&folder, messages.collect(), &BagOptions::default(), |_| [640, 480]).unwrap_err().to_string();
+    let error = detect(&folder, messages.collect(), &OpenOptions::default(), |_| [640, 480]).unwrap_err().to_string();
     assert!(both.iter().all(|topic| error.contains(topic)) && error.contains("only one is of rectified"), "{error}");
 }
 
@@ -104,18 +104,18 @@ fn images_of_another_size_than_the_camera_info_are_refused_with_both_sizes_unles
         let images = [1, 2].map(|second| image("/left/image_raw/compressed", "left", second));
         images.into_iter().chain([info("/left/camera_info", "left", 0)]).collect::<Vec<_>>()
     };
-    let error = detect(&folder, messages(), &BagOptions::default(), |_| [320, 240]).unwrap_err().to_string();
+    let error = detect(&folder, messages(), &OpenOptions::default(), |_| [320, 240]).unwrap_err().to_string();
     for part in
         ["bag.mcap: /left/image_raw/compressed: images are of 320 x 240 px", "/left/camera_info is of 640 x 480 px"]
     {
         assert!(error.contains(part), "{error}");
     }
     let given = RecordedCamera { name: "left".into(), fx: Some(300.0), ..RecordedCamera::default() };
-    let options = BagOptions { cameras: vec![given], ..BagOptions::default() };
+    let options = OpenOptions { cameras: vec![given], ..OpenOptions::default() };
     let camera = detect(&folder, messages(), &options, |_| [320, 240]).unwrap().recording.cameras[0].clone();
     assert_eq!((camera.size, lens(&camera)), (Some([320, 240]), [Some(300.0), None, None, None]));
     let error =
-        detect(&folder, messages(), &BagOptions::default(), |second| [640, if second == 2 { 360 } else { 480 }]);
+        detect(&folder, messages(), &OpenOptions::default(), |second| [640, if second == 2 { 360 } else { 480 }]);
     let error = error.unwrap_err().to_string();
     assert!(
         error.contains("the image of 2.000000 s is of 640 x 360 px, and those before are of 640 x 480 px"),
@@ -123,7 +123,7 @@ fn images_of_another_size_than_the_camera_info_are_refused_with_both_sizes_unles
     );
     // Without a CameraInfo, the size is that of the images.
     let alone = vec![image("/left/image_raw/compressed", "left", 1)];
-    let camera = detect(&folder, alone, &BagOptions::default(), |_| [320, 240]).unwrap().recording.cameras[0].clone();
+    let camera = detect(&folder, alone, &OpenOptions::default(), |_| [320, 240]).unwrap().recording.cameras[0].clone();
     assert_eq!((camera.size, camera.fx), (Some([320, 240]), None));
 }
 
@@ -133,7 +133,7 @@ fn a_size_that_is_given_leaves_the_lens_of_the_bag() {
     let messages = || vec![info("/left/camera_info", "left", 0), image("/left/image_raw/compressed", "left", 1)];
     let of = |name: &str, size| {
         let cameras = vec![RecordedCamera { name: name.into(), size: Some(size), ..RecordedCamera::default() }];
-        detect(&folder, messages(), &BagOptions { cameras, ..BagOptions::default() }, |_| [640, 480])
+        detect(&folder, messages(), &OpenOptions { cameras, ..OpenOptions::default() }, |_| [640, 480])
     };
     let camera = of("left", [640, 480]).unwrap().recording.cameras[0].clone();
     assert_eq!((lens(&camera), camera.distortion.is_some()), (RAW, true));
@@ -146,7 +146,7 @@ fn a_size_that_is_given_leaves_the_lens_of_the_bag() {
 #[test]
 fn a_camera_info_that_cannot_be_read_matters_where_it_is_of_the_images() {
     let folder = Folder::new("bag-unrelated");
-    let read = |messages| detect(&folder, messages, &BagOptions::default(), |_| [640, 480]);
+    let read = |messages| detect(&folder, messages, &OpenOptions::default(), |_| [640, 480]);
     let image = || image("/left/image_raw/compressed", "left", 1);
     let bag =
         read(vec![info("/depth/camera_info", "depth", 2), info("/left/camera_info", "left", 0), image()]).unwrap();

@@ -1,6 +1,7 @@
 //! LeRobot's datasets: Parquet files of numbers with a description beside.
 use crate::cli::Folder;
-use handeye::recording::{Actions, Angles, Recording, Table, TableOptions};
+use crate::tables::of_table;
+use handeye::recording::{Actions, Angles, OpenOptions, Opened, Recording, TableOptions};
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::column::writer::ColumnWriter;
 use parquet::data_type::ByteArray;
@@ -124,9 +125,12 @@ fn a_dataset_is_read_with_the_names_of_its_motors_and_degrees_where_they_are_sai
     let names = ["[\"pan.pos\",\"lift.pos\"]", "{\"motors\":[\"pan\",\"lift\"]}"];
     for (codec, names) in codecs.into_iter().zip(names.into_iter().cycle()) {
         dataset(folder.path(), names, codec);
-        let options =
-            TableOptions { angles: Angles::Degrees(Vec::new()), actions: Actions::Targets, ..TableOptions::default() };
-        let Table { recording, notes, .. } = Table::read_lerobot(folder.path(), &options).unwrap();
+        let options = of_table(TableOptions {
+            angles: Angles::Degrees(Vec::new()),
+            actions: Actions::Targets,
+            ..TableOptions::default()
+        });
+        let Opened { recording, notes, .. } = Recording::open_with(folder.path(), &options).unwrap();
         assert_eq!(recording.joints, ["pan", "lift"]);
         // 0.1 in 32 bits is 0.1, not 0.10000000149; the second episode goes on a second later, in whatever file it stands.
         let found = times(&recording);
@@ -141,13 +145,13 @@ fn a_dataset_is_read_with_the_names_of_its_motors_and_degrees_where_they_are_sai
         assert!(said.contains("times begin anew 1 times") && said.contains("observation.note"), "{said}");
 
         let file = folder.path().join("data/chunk-000/file-001.parquet");
-        let options = TableOptions { angles: Angles::Radians, ..TableOptions::default() };
-        let Table { recording, notes, .. } = Table::read_parquet(&file, &options).unwrap();
+        let options = of_table(TableOptions { angles: Angles::Radians, ..TableOptions::default() });
+        let Opened { recording, notes, .. } = Recording::open_with(&file, &options).unwrap();
         let joints: Vec<_> = recording.samples.iter().map(|sample| sample.joints.clone().unwrap()[1]).collect();
         assert_eq!(joints, [55.0, 56.0, 57.0]);
         assert!(notes.iter().any(|note| note.starts_with("actions are left out;")), "{notes:?}");
 
-        let error = Table::read_parquet(&file, &TableOptions::default()).unwrap_err().to_string();
+        let error = Recording::open_with(&file, &OpenOptions::default()).unwrap_err().to_string();
         assert!(error.contains("file-001.parquet: row 1, column `joints.lift`: 55 is more than two turns"), "{error}");
     }
     let (said, _) = folder.expect(0, "convert . --degrees --joints lift,pan --episodes 0 -o out.jsonl");
@@ -176,13 +180,8 @@ fn episodes_are_those_of_the_dataset_whatever_file_they_stand_in() {
     ];
     write(&file(2), Compression::UNCOMPRESSED, &columns);
     let read = |episodes: &[u64]| {
-        let options = TableOptions {
-            episodes: episodes.to_vec(),
-            angles: Angles::Radians,
-            actions: Actions::Motions,
-            ..TableOptions::default()
-        };
-        Table::read_lerobot(folder.path(), &options)
+        let options = TableOptions { episodes: episodes.to_vec(), angles: Angles::Radians, actions: Actions::Motions };
+        Recording::open_with(folder.path(), &of_table(options))
     };
     let one = read(&[1]).unwrap().recording;
     let second: Vec<f64> = one.samples.iter().map(|sample| sample.joints.as_ref().unwrap()[1]).collect();
@@ -213,10 +212,10 @@ fn time_that_goes_back_within_an_episode_is_refused_with_its_row() {
         ]
     };
     write(&path, Compression::UNCOMPRESSED, &columns([0, 0, 1]));
-    let found = Table::read_parquet(&path, &TableOptions::default()).unwrap().recording;
+    let found = Recording::open_with(&path, &OpenOptions::default()).unwrap().recording;
     assert_eq!(times(&found), [0.0, 0.5, 1.5]);
     write(&path, Compression::UNCOMPRESSED, &columns([0, 0, 0]));
-    let error = Table::read_parquet(&path, &TableOptions::default()).unwrap_err().to_string();
+    let error = Recording::open_with(&path, &OpenOptions::default()).unwrap_err().to_string();
     assert!(error.contains("row 3, column `timestamp`: time goes back, from 0.5 s to 0.25 s"), "{error}");
 }
 
@@ -228,7 +227,7 @@ fn times_whose_type_says_their_unit_are_in_it() {
         let times = Column::Nanoseconds(vec![1_700_000_000_000_000_000, 1_700_000_010_000_000_000]);
         let columns = [("joints.a", Column::Floats(vec![0.5, 0.25])), (name, times)];
         write(&path, Compression::UNCOMPRESSED, &columns);
-        let Table { recording, notes, .. } = Table::read_parquet(&path, &TableOptions::default()).unwrap();
+        let Opened { recording, notes, .. } = Recording::open_with(&path, &OpenOptions::default()).unwrap();
         let found = self::times(&recording);
         assert!(near(&found, &[1.7e9, 1.7e9 + 10.0], 1e-6), "{name}: {found:?}");
         assert!(!notes.iter().any(|note| note.contains("1970")), "{notes:?}");
@@ -252,8 +251,8 @@ fn actions_of_other_names_and_columns_of_other_kinds_leave_the_joints_readable()
     };
     let three = vec![vec![0.0, 1.0, 2.0]; 2];
     write(&folder.path().join("data/file-000.parquet"), Compression::SNAPPY, &columns(three));
-    let read = |options: &TableOptions| Table::read_lerobot(folder.path(), options);
-    let Table { recording, notes, .. } = read(&TableOptions::default()).unwrap();
+    let read = |options: &OpenOptions| Recording::open_with(folder.path(), options);
+    let Opened { recording, notes, .. } = read(&OpenOptions::default()).unwrap();
     assert_eq!((&recording.joints[..], recording.cameras.len()), (&["pan".to_owned(), "lift".to_owned()][..], 0));
     let joints: Vec<_> = recording.samples.iter().map(|sample| sample.joints.clone().unwrap()).collect();
     assert_eq!(joints, [[0.5, 0.25], [0.75, 0.5]]);
@@ -262,7 +261,7 @@ fn actions_of_other_names_and_columns_of_other_kinds_leave_the_joints_readable()
         assert!(said.contains(&format!("observation.{passed}")), "{passed}: {said}");
     }
     assert!(said.contains("next.reward") && said.contains("actions are left out (of x, y, gripper)"), "{said}");
-    let motions = TableOptions { actions: Actions::Motions, ..TableOptions::default() };
+    let motions = of_table(TableOptions { actions: Actions::Motions, ..TableOptions::default() });
     let error = read(&motions).unwrap_err().to_string();
     assert!(error.contains("there is `action.x`, and no `action.pan`"), "{error}");
 
@@ -270,7 +269,7 @@ fn actions_of_other_names_and_columns_of_other_kinds_leave_the_joints_readable()
     describe(folder.path(), "[\"pan\",\"lift\"]", "null");
     write(&folder.path().join("data/file-000.parquet"), Compression::SNAPPY, &columns(rows(&[[1.0, 1.5], [0.0, 0.0]])));
     let commanded = |actions: Actions| {
-        let recording = read(&TableOptions { actions, ..TableOptions::default() }).unwrap().recording;
+        let recording = read(&of_table(TableOptions { actions, ..TableOptions::default() })).unwrap().recording;
         recording.samples[0].joint_action.clone()
     };
     assert_eq!(commanded(Actions::Unsaid), None);
@@ -279,7 +278,7 @@ fn actions_of_other_names_and_columns_of_other_kinds_leave_the_joints_readable()
 
     // Names that are too few are none.
     describe(folder.path(), "[\"state\"]", "null");
-    let Table { recording, notes, .. } = read(&TableOptions::default()).unwrap();
+    let Opened { recording, notes, .. } = read(&OpenOptions::default()).unwrap();
     assert_eq!(recording.joints, ["j1", "j2"]);
     assert!(
         notes
@@ -295,10 +294,10 @@ fn a_file_that_is_damaged_anywhere_is_refused_or_read_and_ends_no_program() {
     dataset(folder.path(), "[\"pan\",\"lift\"]", Compression::UNCOMPRESSED);
     let path = folder.path().join("data/chunk-000/file-000.parquet");
     let whole = std::fs::read(&path).unwrap();
-    let options = TableOptions { angles: Angles::Radians, ..TableOptions::default() };
+    let options = of_table(TableOptions { angles: Angles::Radians, ..TableOptions::default() });
     for end in (0..whole.len()).step_by(97) {
         std::fs::write(&path, &whole[..end]).unwrap();
-        let error = Table::read_parquet(&path, &options).unwrap_err();
+        let error = Recording::open_with(&path, &options).unwrap_err();
         assert!(error.is_input() && error.to_string().contains("file-000.parquet"), "cut at {end}: {error}");
     }
     let mut refused = 0;
@@ -306,7 +305,7 @@ fn a_file_that_is_damaged_anywhere_is_refused_or_read_and_ends_no_program() {
         let mut broken = whole.clone();
         broken[place] ^= 0x5a;
         std::fs::write(&path, &broken).unwrap();
-        refused += usize::from(Table::read_parquet(&path, &options).is_err_and(|error| error.is_input()));
+        refused += usize::from(Recording::open_with(&path, &options).is_err_and(|error| error.is_input()));
     }
     assert!(refused > 10, "{refused} refused");
 }

@@ -9,6 +9,7 @@ mod cli_infer;
 mod cli_servo;
 mod depth;
 mod detect;
+mod detect_recordings;
 mod determinism;
 mod deviations;
 mod doctor;

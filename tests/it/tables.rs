@@ -1,14 +1,18 @@
 //! Recordings in tables: CSV.
 use crate::cli::Folder;
-use handeye::recording::{Angles, Recording, Sample, Table, TableOptions};
+use handeye::recording::{Angles, OpenOptions, Opened, Recording, Sample, TableOptions};
 use handeye::rig::catalog;
 use handeye::simulate::{SimulateOptions, simulate};
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-fn csv(folder: &Folder, text: &str, options: &TableOptions) -> Result<Table, handeye::Error> {
+fn csv(folder: &Folder, text: &str, options: &OpenOptions) -> Result<Opened, handeye::Error> {
     folder.write("table.csv", text);
-    Table::read_csv(&folder.path().join("table.csv"), options)
+    Recording::open_with(&folder.path().join("table.csv"), options)
+}
+
+pub fn of_table(table: TableOptions) -> OpenOptions {
+    OpenOptions { table, ..OpenOptions::default() }
 }
 
 /// A recording as CSV, number by number.
@@ -57,10 +61,12 @@ fn a_recording_as_csv_is_the_same_recording_in_any_order_of_columns_and_joints()
     // The columns the other way round, apart by semicolons.
     let reversed: Vec<String> =
         text.lines().map(|line| line.split(',').rev().collect::<Vec<_>>().join(" ; ")).collect();
-    let options =
-        TableOptions { known_joints: recording.joints.clone(), angles: Angles::Radians, ..TableOptions::default() };
+    let options = OpenOptions {
+        known_joints: recording.joints.clone(),
+        ..of_table(TableOptions { angles: Angles::Radians, ..TableOptions::default() })
+    };
     for text in [text, format!("\u{feff}# a comment\n\n{}\r\n", reversed.join("\r\n"))] {
-        let Table { recording: found, notes, .. } = csv(&folder, &text, &options).unwrap();
+        let Opened { recording: found, notes, .. } = csv(&folder, &text, &options).unwrap();
         assert_eq!((&found.joints, &found.features), (&recording.joints, &recording.features));
         assert_eq!(found.samples, recording.samples);
         assert!(notes.is_empty(), "{notes:?}");
@@ -78,6 +84,12 @@ fn the_rig_learned_from_csv_is_that_of_the_recording_byte_for_byte() {
     folder.expect(0, "calibrate motions.csv --rig rig.toml -o from-csv.toml");
     folder.expect(0, "calibrate motions.jsonl --rig rig.toml -o from-lines.toml");
     assert_eq!(folder.read("from-csv.toml"), folder.read("from-lines.toml"));
+    // What is known of cameras is added to any format, and nothing else is asked of JSON Lines.
+    let name = &recording.cameras[0].name;
+    let (_, error) = folder.expect(2, &format!("convert motions.jsonl --camera {name}=8x6 -o out.jsonl"));
+    assert!(error.contains("motions.jsonl: camera") && error.contains("is said to be of 8 x 6 px"), "{error}");
+    let (_, error) = folder.expect(2, "convert motions.jsonl --joints a -o out.jsonl");
+    assert!(error.contains("motions.jsonl is a recording, where --joints has no effect"), "{error}");
 }
 
 #[test]
@@ -88,7 +100,7 @@ fn columns_mean_what_their_names_say() {
         top.board.x,top.board.y,top.board.z,top.board.roll_deg,top.board.pitch_deg,top.board.yaw_deg,comment\n\
         1500,0.25,90,1,2,3,0,0,1,0,0.5,-0.5,10.5,20.25,0.1,0.2,0.3,1,1,1,0,0,90,begins\n\
         2000,nan,,,,,,,,,,,,,,NULL,,,,,,,,\n";
-    let Table { recording, notes, .. } = csv(&folder, text, &TableOptions::default()).unwrap();
+    let Opened { recording, notes, .. } = csv(&folder, text, &OpenOptions::default()).unwrap();
     assert_eq!(recording.joints, ["lift", "elbow"]);
     let cameras: Vec<&str> = recording.cameras.iter().map(|camera| camera.name.as_str()).collect();
     assert_eq!(
@@ -122,15 +134,15 @@ fn joints_are_found_under_the_names_that_the_options_or_the_rig_give_them() {
     let text = "t,actual_q_0,actual_q_1,gripper,left.f.u,left.f.v\n0,0.5,1.5,7,1,2\n";
     let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
     for options in [
-        TableOptions { joints: names(&["actual_q_1", "actual_q_0"]), ..TableOptions::default() },
-        TableOptions { known_joints: names(&["actual_q_1", "actual_q_0"]), ..TableOptions::default() },
+        OpenOptions { joints: names(&["actual_q_1", "actual_q_0"]), ..OpenOptions::default() },
+        OpenOptions { known_joints: names(&["actual_q_1", "actual_q_0"]), ..OpenOptions::default() },
     ] {
-        let Table { recording, notes, .. } = csv(&folder, text, &options).unwrap();
+        let Opened { recording, notes, .. } = csv(&folder, text, &options).unwrap();
         assert_eq!(recording.joints, ["actual_q_1", "actual_q_0"]);
         assert_eq!(recording.samples[0].joints, Some(vec![1.5, 0.5]));
         assert!(notes.iter().any(|note| note.contains("left out: gripper")), "{notes:?}");
     }
-    let options = TableOptions { joints: names(&["actual_q_2"]), ..TableOptions::default() };
+    let options = OpenOptions { joints: names(&["actual_q_2"]), ..OpenOptions::default() };
     let error = csv(&folder, text, &options).unwrap_err().to_string();
     assert!(error.contains("table.csv:1:1") && error.contains("no joint `actual_q_2`"), "{error}");
 }
@@ -139,16 +151,16 @@ fn joints_are_found_under_the_names_that_the_options_or_the_rig_give_them() {
 fn degrees_are_taken_where_they_are_said_and_never_guessed() {
     let folder = Folder::new("tables-degrees");
     let text = "joints.a,joints.b,left.f.u,left.f.v\n0,0.5,1,2\n93.5,0.25,1,2\n";
-    let error = csv(&folder, text, &TableOptions::default()).unwrap_err().to_string();
+    let error = csv(&folder, text, &OpenOptions::default()).unwrap_err().to_string();
     assert!(error.contains("table.csv:3:1: 93.5 is more than two turns") && error.contains("--degrees"), "{error}");
     let read = |angles: Angles| {
-        let options = TableOptions { angles, ..TableOptions::default() };
+        let options = of_table(TableOptions { angles, ..TableOptions::default() });
         csv(&folder, text, &options).unwrap().recording.samples[1].joints.clone().unwrap()
     };
     assert_eq!(read(Angles::Radians), [93.5, 0.25]);
     assert_eq!(read(Angles::Degrees(Vec::new())), [93.5 * (PI / 180.0), 0.25 * (PI / 180.0)]);
     assert_eq!(read(Angles::Degrees(vec!["a".to_owned()])), [93.5 * (PI / 180.0), 0.25]);
-    let small = csv(&folder, "joints.a,left.f.u,left.f.v\n1,1,2\n", &TableOptions::default()).unwrap();
+    let small = csv(&folder, "joints.a,left.f.u,left.f.v\n1,1,2\n", &OpenOptions::default()).unwrap();
     assert!(small.notes.iter().any(|note| note.contains("taken for radians")), "{:?}", small.notes);
 }
 
@@ -192,11 +204,12 @@ fn mistakes_in_a_table_are_named_with_line_and_column() {
         ("joints.a,joint_action.b\n0,1\n", "table.csv:1:10: there is `joint_action.b`, and no `joint_action.a`"),
     ];
     for (text, expected) in cases {
-        let error = csv(&folder, text, &TableOptions::default()).unwrap_err();
+        let error = csv(&folder, text, &OpenOptions::default()).unwrap_err();
         assert!(error.is_input() && error.to_string().contains(expected), "{text:?}: {error}");
     }
     std::fs::write(folder.path().join("table.csv"), b"joints.a\n1\n\xff\n").unwrap();
-    let error = Table::read_csv(&folder.path().join("table.csv"), &TableOptions::default()).unwrap_err().to_string();
+    let error =
+        Recording::open_with(&folder.path().join("table.csv"), &OpenOptions::default()).unwrap_err().to_string();
     assert!(error.contains("table.csv:3:1: this is no UTF-8"), "{error}");
 }
 
@@ -213,7 +226,7 @@ fn times_that_are_dates_in_another_unit_are_converted_and_that_is_said() {
     ] {
         let start = 1_700_000_000.0 * unit;
         let text = format!("{name},joints.a\n{start:.0},0.5\n{:.0},0.6\n", start + 10.0 * unit);
-        let Table { recording, notes, .. } = csv(&folder, &text, &TableOptions::default()).unwrap();
+        let Opened { recording, notes, .. } = csv(&folder, &text, &OpenOptions::default()).unwrap();
         let [first, second] = [0, 1].map(|row| recording.samples[row].time.unwrap());
         assert!(
             (first - 1.7e9).abs() < 1e-6 && (second - first - 10.0).abs() < 1e-6,
@@ -223,7 +236,7 @@ fn times_that_are_dates_in_another_unit_are_converted_and_that_is_said() {
         assert_eq!(said, is_said, "{name}, {unit}: {notes:?}");
     }
     // Nanoseconds of a clock that begins with the recording show in nothing but the time between rows.
-    let Table { notes, .. } = csv(&folder, "t,joints.a\n0,0.5\n100000000,0.6\n", &TableOptions::default()).unwrap();
+    let Opened { notes, .. } = csv(&folder, "t,joints.a\n0,0.5\n100000000,0.6\n", &OpenOptions::default()).unwrap();
     assert!(notes.iter().any(|note| note.contains("up to 100000000 s apart")), "{notes:?}");
 }
 
@@ -231,7 +244,7 @@ fn times_that_are_dates_in_another_unit_are_converted_and_that_is_said() {
 fn a_table_is_held_to_what_a_recording_file_is_held_to() {
     let folder = Folder::new("tables-checked");
     let text = "joints.a,joint_action.a,left.f.u,left.f.v\n0,0.5,1,2\n0.5,0.5,1,2\n";
-    let Table { recording, .. } = csv(&folder, text, &TableOptions::default()).unwrap();
+    let Opened { recording, .. } = csv(&folder, text, &OpenOptions::default()).unwrap();
     // What is commanded last leads nowhere.
     let actions: Vec<_> = recording.samples.iter().map(|sample| sample.joint_action.clone()).collect();
     assert_eq!(actions, [Some(vec![0.5]), None]);

@@ -1,13 +1,13 @@
 //! Which camera an image is of, and what the bag says of it.
-use super::BagOptions;
-use super::images::{Images, Source, tidy};
+use super::images::{Images, Source};
 use super::kinds::need;
 use super::topics::{Topic, is_topic};
 use super::value::Value;
 use crate::Error;
 use crate::camera::CameraModel;
 use crate::intrinsics::model_of;
-use crate::recording::{RecordedCamera, px};
+use crate::recording::names::tidy;
+use crate::recording::{OpenOptions, RecordedCamera, px};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -95,7 +95,7 @@ impl Info {
 pub(super) fn cameras(
     path: &Path,
     images: &mut Images,
-    options: &BagOptions,
+    options: &OpenOptions,
 ) -> Result<(Vec<RecordedCamera>, Vec<u32>), Error> {
     let (sources, topics) = (&images.sources, &images.topics);
     let names: Vec<String> = sources.iter().map(|source| name(source, sources, topics, options)).collect();
@@ -148,9 +148,9 @@ pub(super) fn cameras(
 }
 
 /// What the camera of a source is called.
-fn name(source: &Source, sources: &[Source], topics: &[Topic], options: &BagOptions) -> String {
+fn name(source: &Source, sources: &[Source], topics: &[Topic], options: &OpenOptions) -> String {
     let space = |source: &Source| topics[source.0].namespace();
-    let given = options.camera_topics.iter().find(|(topic, _)| is_topic(&topics[source.0].name, topic));
+    let given = options.bag.camera_topics.iter().find(|(topic, _)| is_topic(&topics[source.0].name, topic));
     if let Some((_, Some(name))) = given {
         return tidy(name);
     }

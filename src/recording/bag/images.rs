@@ -1,24 +1,15 @@
 //! The first pass over a bag: what images show, and what is said of cameras.
 use super::cameras::Info;
 use super::kinds::{Kind, features, frame, need, stamp};
+use super::labels::Labels;
 use super::messages::{Channel, Visitor};
 use super::topics::{Topic, is_topic};
 use super::{BagOptions, Detect, Found};
 use crate::Error;
-use crate::recording::names::Names;
+use crate::recording::groups::Image;
 use crate::recording::px;
 use std::collections::BTreeMap;
 use std::path::Path;
-
-/// What one message says of one image.
-pub(in crate::recording) struct Image {
-    /// [ns]
-    pub stamp: i64,
-    /// Index of its source.
-    pub source: usize,
-    /// By index, with the pixel.
-    pub features: Vec<(u32, [f64; 2])>,
-}
 
 /// A topic (by index) and a frame: images of one camera.
 pub(super) type Source = (usize, String);
@@ -42,11 +33,13 @@ pub(super) struct Images<'a> {
     options: &'a BagOptions,
     pub topics: Vec<Topic>,
     pub images: Vec<Image>,
-    pub features: Names,
+    pub features: Labels,
     pub sources: Vec<Source>,
     /// The size of each source's images, where they were looked at.
     pub sizes: BTreeMap<usize, [u32; 2]>,
     pub infos: BTreeMap<Source, Said>,
+    /// Of the last image, whose memory the next one takes.
+    seen: Vec<(u32, [f64; 2])>,
     /// Pixels that are no numbers.
     pub not_finite: usize,
     /// Looks for features in images; where it is not given, those of detectors' messages are taken.
@@ -63,10 +56,11 @@ impl<'a> Images<'a> {
             options,
             topics: Vec::new(),
             images: Vec::new(),
-            features: Names::default(),
+            features: Labels::default(),
             sources: Vec::new(),
             sizes: BTreeMap::new(),
             infos: BTreeMap::new(),
+            seen: Vec::new(),
             not_finite: 0,
             detect,
             pending: Vec::new(),
@@ -100,7 +94,8 @@ impl<'a> Images<'a> {
                             px(known)
                         )));
                     }
-                    let features = features.iter().map(|(name, pixel)| (self.features.intern(name), *pixel)).collect();
+                    let features =
+                        features.iter().map(|(name, pixel)| (self.features.names.intern(name), *pixel)).collect();
                     self.images.push(Image { stamp: *stamp, source: *source, features });
                 }
                 Err(why) => {
@@ -118,14 +113,15 @@ impl<'a> Images<'a> {
         let named = &self.options.camera_topics;
         named.is_empty() || named.iter().any(|(known, _)| is_topic(topic, known))
     }
+}
 
-    fn source(&mut self, channel: usize, frame: &str) -> usize {
-        let known = self.sources.iter().position(|(topic, known)| *topic == channel && known == frame);
-        known.unwrap_or_else(|| {
-            self.sources.push((channel, frame.to_owned()));
-            self.sources.len() - 1
-        })
-    }
+/// The index of a source, which is added where it is new.
+fn source(sources: &mut Vec<Source>, channel: usize, frame: &str) -> usize {
+    let known = sources.iter().position(|(topic, known)| *topic == channel && known == frame);
+    known.unwrap_or_else(|| {
+        sources.push((channel, frame.to_owned()));
+        sources.len() - 1
+    })
 }
 
 impl Visitor for Images<'_> {
@@ -139,28 +135,38 @@ impl Visitor for Images<'_> {
         let topic = &self.topics[channel];
         match topic.kind {
             Some(Kind::CompressedImage) if self.detect.is_some() && self.is_meant(&topic.name) => {
-                let (stamp, frame, bytes) = topic.decode(self.path, time, data, |message| {
-                    Ok((stamp(message)?, frame(message).to_owned(), need(message.bytes("data"), "data")?.to_vec()))
+                let image = topic.decode(self.path, time, data, |message| {
+                    let bytes = need(message.bytes("data"), "data")?.to_vec();
+                    Ok(Pending {
+                        stamp: stamp(message)?,
+                        source: source(&mut self.sources, channel, frame(message)),
+                        bytes,
+                    })
                 })?;
-                let source = self.source(channel, &frame);
-                self.pending.push(Pending { stamp, source, bytes });
+                self.pending.push(image);
                 if self.pending.len() >= TOGETHER {
                     self.look()?;
                 }
             }
             Some(kind) if kind.is_of_images() && self.detect.is_none() && self.is_meant(&topic.name) => {
-                let (stamp, frame, seen) = topic.decode(self.path, time, data, |message| {
-                    Ok((stamp(message)?, frame(message).to_owned(), features(kind, message)?))
+                let seen = &mut self.seen;
+                seen.clear();
+                let (stamp, source) = topic.decode(self.path, time, data, |message| {
+                    features(kind, message, &mut |label, pixel| match pixel.iter().all(|number| number.is_finite()) {
+                        true => seen.push((self.features.index(label), pixel)),
+                        false => self.not_finite += 1,
+                    })?;
+                    Ok((stamp(message)?, source(&mut self.sources, channel, frame(message))))
                 })?;
-                let source = self.source(channel, &frame);
-                let number = seen.len();
-                let is_finite = |pixel: &[f64; 2]| pixel.iter().all(|number| number.is_finite());
-                let seen = seen.into_iter().filter(|(_, pixel)| is_finite(pixel));
-                let features: Vec<_> = seen.map(|(name, pixel)| (self.features.intern(&tidy(&name)), pixel)).collect();
-                self.not_finite += number - features.len();
-                self.images.push(Image { stamp, source, features });
+                // As long as it is, and no longer.
+                self.images.push(Image { stamp, source, features: seen.as_slice().to_vec() });
             }
             Some(Kind::CameraInfo) => {
+                // It is said again with every image.
+                let is_known = |of: &str| self.infos.keys().any(|(known, frame)| *known == channel && frame == of);
+                if topic.decode_head(data, |message| is_known(frame(message))) == Some(true) {
+                    return Ok(());
+                }
                 let mut of = String::new();
                 let info = topic.decode(self.path, time, data, |message| {
                     frame(message).clone_into(&mut of);
@@ -172,10 +178,4 @@ impl Visitor for Images<'_> {
         }
         Ok(())
     }
-}
-
-/// A name without what parameter paths cannot hold.
-pub(super) fn tidy(name: &str) -> String {
-    let name = name.replace(|c: char| c == '.' || c == '*' || c.is_control(), "_");
-    if name.is_empty() { "unnamed".to_owned() } else { name }
 }

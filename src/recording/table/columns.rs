@@ -1,8 +1,9 @@
 //! What the columns of a table are, by their names.
-use super::{Actions, TableOptions};
+use super::Actions;
 use crate::error::suggestion;
+use crate::recording::OpenOptions;
 use crate::recording::clock::UNITS;
-use crate::recording::names::{Names, natural_order};
+use crate::recording::names::{Names, natural_order, tidy};
 use crate::rig::{problem_of_joint_name, problem_of_name};
 use std::collections::BTreeMap;
 
@@ -51,22 +52,22 @@ pub(super) struct Angle {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PoseColumns {
     pub xyz: [usize; 3],
-    pub turn: Turn,
+    pub rotation: Rotation,
 }
 
 impl PoseColumns {
     /// All of them.
     pub(super) fn columns(&self) -> Vec<usize> {
-        let turn = match self.turn {
-            Turn::Quaternion(columns) => columns.to_vec(),
-            Turn::RollPitchYaw(angles) => angles.iter().map(|angle| angle.column).collect(),
+        let rotation = match self.rotation {
+            Rotation::Quaternion(columns) => columns.to_vec(),
+            Rotation::RollPitchYaw(angles) => angles.iter().map(|angle| angle.column).collect(),
         };
-        self.xyz.into_iter().chain(turn).collect()
+        self.xyz.into_iter().chain(rotation).collect()
     }
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Turn {
+pub(super) enum Rotation {
     Quaternion([usize; 4]),
     RollPitchYaw([Angle; 3]),
 }
@@ -89,7 +90,7 @@ pub(super) type Problem = (usize, String);
 impl Columns {
     /// Reads the header. Joints are those of the options; or those that they know where the table has all of them, or all `joints.NAME` in
     /// their order.
-    pub(super) fn new(header: &[String], options: &TableOptions) -> Result<Columns, Problem> {
+    pub(super) fn new(header: &[String], options: &OpenOptions) -> Result<Columns, Problem> {
         let mut columns = Columns::default();
         let mut met: BTreeMap<&str, usize> = BTreeMap::new();
         let mut named_joints = Group::default();
@@ -131,7 +132,7 @@ impl Columns {
         columns.take_joints(header, &named_joints, &options.joints, &options.known_joints)?;
         columns.joint_action = columns.in_order(&joint_action, "joint_action")?;
         columns.actions = action.0.iter().map(|(name, _)| name.clone()).collect();
-        if options.actions != Actions::Unsaid {
+        if options.table.actions != Actions::Unsaid {
             columns.action = columns.in_order(&action, "action")?;
         }
         for (name, parts) in poses {
@@ -193,7 +194,7 @@ impl Columns {
         self.joints = all(&names).unwrap_or_default();
         self.others.retain(|other| !self.joints.iter().any(|joint| header[joint.column] == *other));
         // A column may be asked for by a name that no parameter path can hold.
-        self.joint_names = names.iter().map(|name| name.replace(['.', '*'], "_")).collect();
+        self.joint_names = names.iter().map(|name| tidy(name)).collect();
         for (name, joint) in self.joint_names.iter().zip(&self.joints) {
             if let Some(problem) = problem_of_joint_name(name) {
                 return Err((joint.column, problem));
@@ -291,14 +292,14 @@ impl<'a> Parts<'a> {
     fn pose(&self, of: &str) -> Result<PoseColumns, Problem> {
         let [x, y, z] = ORIGIN.map(|axis| self.need(axis, of));
         let is_rpy = ROLL_PITCH_YAW.iter().any(|angle| self.0.keys().any(|part| part.starts_with(angle)));
-        let turn = if is_rpy {
+        let rotation = if is_rpy {
             let [roll, pitch, yaw] = ROLL_PITCH_YAW.map(|part| self.angle(part, of));
-            Turn::RollPitchYaw([roll?, pitch?, yaw?])
+            Rotation::RollPitchYaw([roll?, pitch?, yaw?])
         } else {
             let [x, y, z, w] = QUATERNION.map(|part| self.need(part, of));
-            Turn::Quaternion([x?, y?, z?, w?])
+            Rotation::Quaternion([x?, y?, z?, w?])
         };
-        Ok(PoseColumns { xyz: [x?, y?, z?], turn })
+        Ok(PoseColumns { xyz: [x?, y?, z?], rotation })
     }
 }
 

@@ -1,11 +1,13 @@
 //! Rows as samples.
-use super::columns::{Angle, Columns, PoseColumns, Time, Turn};
-use super::{Actions, Angles, Rows, Table, TableOptions};
+use super::columns::{Angle, Columns, PoseColumns, Rotation, Time};
+use super::{Actions, Angles, Rows};
 use crate::Error;
 use crate::error::suggestion;
 use crate::geometry::orientation;
 use crate::recording::clock::{LATEST, unit_of_date};
-use crate::recording::{Detection, PointDetection, RecordedCamera, Recording, Sample, TargetDetection};
+use crate::recording::{
+    Detection, OpenOptions, Opened, PointDetection, RecordedCamera, Recording, Sample, TargetDetection,
+};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
 use std::collections::BTreeSet;
@@ -18,7 +20,7 @@ const FARTHEST: f64 = 4.0 * PI;
 const DAY: f64 = 86_400.0;
 
 /// Reads all rows. `cameras`: what the dataset says of cameras, which the options know better.
-pub(super) fn read(mut rows: impl Rows, options: &TableOptions, cameras: &[RecordedCamera]) -> Result<Table, Error> {
+pub(super) fn read(mut rows: impl Rows, options: &OpenOptions, cameras: &[RecordedCamera]) -> Result<Opened, Error> {
     let columns = Columns::new(rows.header(), options).map_err(|(column, problem)| rows.error(column, problem))?;
     if let Some(problem) = without_effect(&columns, options) {
         return Err(Error::Unusable(format!("{}: {problem}", rows.file())));
@@ -33,7 +35,7 @@ pub(super) fn read(mut rows: impl Rows, options: &TableOptions, cameras: &[Recor
     }
     let Reader { samples, mut notes, rows: count, incomplete, restarts, farthest, episodes, unit, .. } = reader;
     let is_missing = |named: &&u64| !episodes.contains(named);
-    if let Some(missing) = options.episodes.iter().find(is_missing) {
+    if let Some(missing) = options.table.episodes.iter().find(is_missing) {
         let file = rows.file();
         return Err(Error::Unusable(format!("{file}: has no episode {missing}; it has {}", in_words(&episodes))));
     }
@@ -70,7 +72,7 @@ pub(super) fn read(mut rows: impl Rows, options: &TableOptions, cameras: &[Recor
     let file = rows.file();
     let described = recording.describe_cameras(&options.cameras);
     described.map_err(|problem| Error::Unusable(format!("{file}: {problem}")))?;
-    Ok(Table { recording: recording.checked_as(&file)?, images, notes })
+    Ok(Opened { recording: recording.checked_as(&file)?, notes, images })
 }
 
 /// Numbers of episodes, those that follow one another as from and to.
@@ -87,14 +89,14 @@ fn in_words(episodes: &BTreeSet<u64>) -> String {
 }
 
 /// What the options name and the table does not have.
-fn without_effect(columns: &Columns, options: &TableOptions) -> Option<String> {
+fn without_effect(columns: &Columns, options: &OpenOptions) -> Option<String> {
     let joints = || columns.joint_names.iter().map(String::as_str);
-    if let Angles::Degrees(named) = &options.angles
+    if let Angles::Degrees(named) = &options.table.angles
         && let Some(name) = named.iter().find(|name| !columns.joint_names.contains(name))
     {
         return Some(format!("there is no joint `{name}` to take for degrees {}", suggestion(name, joints())));
     }
-    (!options.episodes.is_empty() && columns.episode.is_none())
+    (!options.table.episodes.is_empty() && columns.episode.is_none())
         .then(|| "has no column `episode_index`, of which --episodes would name some".to_owned())
 }
 
@@ -110,13 +112,13 @@ fn nothing(file: &str, header: &[String], rows: usize) -> String {
     }
 }
 
-fn note_on_columns(columns: &Columns, options: &TableOptions, left_out: &[String]) -> Vec<String> {
+fn note_on_columns(columns: &Columns, options: &OpenOptions, left_out: &[String]) -> Vec<String> {
     let mut notes = Vec::new();
     let others: Vec<&str> = columns.others.iter().chain(left_out).map(String::as_str).collect();
     if !others.is_empty() {
         notes.push(format!("columns that say nothing of a recording are left out: {}", others.join(", ")));
     }
-    if !columns.actions.is_empty() && options.actions == Actions::Unsaid {
+    if !columns.actions.is_empty() && options.table.actions == Actions::Unsaid {
         let of = if columns.actions == columns.joint_names {
             String::new()
         } else {
@@ -135,7 +137,7 @@ fn note_on_columns(columns: &Columns, options: &TableOptions, left_out: &[String
         ));
     }
     let unsaid = columns.joints.iter().filter(|joint| !joint.in_degrees).count();
-    if unsaid > 0 && options.angles == Angles::Unsaid {
+    if unsaid > 0 && options.table.angles == Angles::Unsaid {
         notes.push("joints are taken for radians or metres, since no column says `_deg`".to_owned());
     }
     notes
@@ -144,7 +146,7 @@ fn note_on_columns(columns: &Columns, options: &TableOptions, left_out: &[String
 /// Samples as they come.
 struct Reader<'a> {
     columns: &'a Columns,
-    options: &'a TableOptions,
+    options: &'a OpenOptions,
     samples: Vec<Sample>,
     notes: Vec<String>,
     /// Rows of the episodes that are read.
@@ -169,9 +171,9 @@ struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     /// `is_typed`: times are seconds, whatever they are called.
-    fn new(columns: &'a Columns, options: &'a TableOptions, is_typed: bool) -> Self {
+    fn new(columns: &'a Columns, options: &'a OpenOptions, is_typed: bool) -> Self {
         let scale = |(joint, angle): (&String, &Angle)| {
-            let scale = match &options.angles {
+            let scale = match &options.table.angles {
                 _ if angle.in_degrees => Some(PI / 180.0),
                 Angles::Unsaid => None,
                 Angles::Degrees(named) if named.is_empty() || named.contains(joint) => Some(PI / 180.0),
@@ -180,7 +182,7 @@ impl<'a> Reader<'a> {
             (angle.column, scale)
         };
         let scales = |angles: &[Angle]| columns.joint_names.iter().zip(angles).map(scale).collect::<Vec<_>>();
-        let is_used = columns.joint_action.is_empty() && options.actions != Actions::Unsaid;
+        let is_used = columns.joint_action.is_empty() && options.table.actions != Actions::Unsaid;
         let joint_action = scales(if is_used { &columns.action } else { &columns.joint_action });
         Reader {
             columns,
@@ -211,7 +213,7 @@ impl<'a> Reader<'a> {
                 self.episodes.insert(episode as u64);
             }
             let is_meant = |named: &u64| *named as f64 == episode;
-            if !self.options.episodes.is_empty() && !self.options.episodes.iter().any(is_meant) {
+            if !self.options.table.episodes.is_empty() && !self.options.table.episodes.iter().any(is_meant) {
                 return Ok(false);
             }
             is_next = self.episode.is_some_and(|last| last != episode);
@@ -225,7 +227,7 @@ impl<'a> Reader<'a> {
         let mut sample = Sample { time: self.time(row, is_next)?, ..Sample::default() };
         sample.joints = self.angles(row, &self.joints)?;
         sample.joint_action = self.angles(row, &self.joint_action)?;
-        if self.options.actions == Actions::Targets && columns.joint_action.is_empty() {
+        if self.options.table.actions == Actions::Targets && columns.joint_action.is_empty() {
             let motion =
                 |(target, joints): (Vec<f64>, &Vec<f64>)| target.iter().zip(joints).map(|(a, b)| a - b).collect();
             sample.joint_action = sample.joint_action.zip(sample.joints.as_ref()).map(motion);
@@ -341,10 +343,10 @@ impl PoseColumns {
         if !is_there(row, &self.columns())? {
             return Ok(None);
         }
-        let rotation = match self.turn {
-            Turn::Quaternion(columns) => orientation::from_quaternion(columns.map(|column| row[column]))
+        let rotation = match self.rotation {
+            Rotation::Quaternion(columns) => orientation::from_quaternion(columns.map(|column| row[column]))
                 .ok_or_else(|| (columns[0], "a quaternion of length 0 is no rotation".to_owned()))?,
-            Turn::RollPitchYaw(angles) => orientation::from_rpy(
+            Rotation::RollPitchYaw(angles) => orientation::from_rpy(
                 angles.map(|angle| row[angle.column] * if angle.in_degrees { PI / 180.0 } else { 1.0 }),
             ),
         };
