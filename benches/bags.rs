@@ -1,4 +1,4 @@
-//! How fast bags are read, and in how much memory: messages a second and the peak.
+//! How fast bags are read, and in how much memory: messages a second of CPU time, the peak, and its part of the bag's size.
 //!
 //! `cargo bench --bench bags -- [MEGABYTES]`
 //!
@@ -6,7 +6,7 @@
 //! written to the folder for temporary files and read by a process of its own, which is asked for its peak. The second bag has as many
 //! samples as the first and four times the bytes: what it takes more is not due to its samples.
 use cpu_time::ProcessTime;
-use handeye::recording::{Bag, BagOptions};
+use handeye::recording::{OpenOptions, Recording};
 use mcap::records::MessageHeader;
 use mcap::{Compression, WriteOptions};
 use std::collections::BTreeMap;
@@ -49,8 +49,8 @@ fn main() {
     }
     let megabytes = arguments.first().and_then(|argument| argument.parse().ok()).unwrap_or(1000.0);
     println!(
-        "{:>30} {:>7} {:>10} {:>8} {:>7} {:>11} {:>11} {:>8}",
-        "joint states", "MB", "messages", "samples", "s", "messages/s", "CPU s of it", "peak MB"
+        "{:>30} {:>7} {:>10} {:>8} {:>7} {:>7} {:>14} {:>8} {:>9}",
+        "joint states", "MB", "messages", "samples", "s", "CPU s", "messages/CPU s", "peak MB", "of size"
     );
     let path = std::env::temp_dir().join(format!("handeye-bags-{}.mcap", std::process::id()));
     let seconds = 1e6 * megabytes / bytes_per_second(500.0);
@@ -71,8 +71,10 @@ fn main() {
         let &[samples, wall, cpu, peak] = &numbers[..] else {
             panic!("{}", String::from_utf8_lossy(&output.stderr));
         };
-        let rate = f64::from(messages) / wall;
-        println!("{name:>30} {size:7.0} {messages:10} {samples:8} {wall:7.2} {rate:11.0} {cpu:11.2} {peak:8.0}");
+        let (rate, part) = (f64::from(messages) / cpu, peak / size);
+        println!(
+            "{name:>30} {size:7.0} {messages:10} {samples:8} {wall:7.2} {cpu:7.2} {rate:14.0} {peak:8.0} {part:9.2}"
+        );
     }
     std::fs::remove_file(&path).expect("the bag can be removed");
 }
@@ -85,7 +87,7 @@ fn bytes_per_second(hertz: f64) -> f64 {
 /// Reads a bag and prints samples, seconds, seconds of CPU and the peak [MB].
 fn read(path: &Path) {
     let (start, cpu) = (Instant::now(), ProcessTime::now());
-    let bag = Bag::read(path, &BagOptions::default()).expect("the bag is whole");
+    let bag = Recording::open_with(path, &OpenOptions::default()).expect("the bag is whole");
     let (wall, cpu) = (start.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap_or("0");

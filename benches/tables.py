@@ -26,6 +26,7 @@ def pixels(header, samples):
     """Columns of all features, an empty list of none that was seen."""
     names = sorted({(camera, feature) for sample in samples for camera, seen in sample.get("pixels", {}).items() for feature in seen})
     columns = {}
+    assert names, "the recording shows features"
     for camera, feature in names:
         for axis, letter in enumerate("uv"):
             seen = [sample.get("pixels", {}).get(camera, {}).get(feature) for sample in samples]
@@ -39,7 +40,7 @@ def with_csv(header, samples, path):
     with open(path, "w", newline="") as stream:
         writer = csv.writer(stream)
         writer.writerow(columns)
-        writer.writerows(zip(*columns.values()))
+        writer.writerows(zip(*columns.values(), strict=True))
 
 
 def with_lerobot(header, samples, folder, version):
@@ -98,8 +99,9 @@ def main():
             command = [HANDEYE, "convert", folder / version, "--degrees", "--joints", ",".join(header["joints"]), "-o", converted]
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
             read = [json.loads(line) for line in converted.read_text().splitlines()][1:]
-            off = max(abs(a - b) for one, other in zip(read, samples) for a, b in zip(one["joints"], other["joints"]))
-            same = all(one.get("pixels") == other.get("pixels") for one, other in zip(read, samples))
+            pairs = list(zip(read, samples, strict=True))
+            off = max(abs(a - b) for one, other in pairs for a, b in zip(one["joints"], other["joints"], strict=True))
+            same = all(one.get("pixels") == other.get("pixels") for one, other in pairs)
             print(f"LeRobot {version}: joints off by {off:.1e} rad at most, pixels {'the same' if same else 'OTHERS'}")
 
 

@@ -3,7 +3,7 @@ use crate::arrays::{Floats, NewArray, array, rows};
 use crate::errors::{raise, unusable};
 use crate::recording_arrays::Arrays;
 use crate::rig::Rig;
-use handeye::recording::{self, Angles, Bag, BagOptions, Format, Opened, RecordedCamera, Table, TableOptions};
+use handeye::recording::{self, Angles, BagOptions, OpenOptions, RecordedCamera, TableOptions};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PySlice};
@@ -72,22 +72,22 @@ impl Recording {
     ) -> PyResult<Self> {
         let names = |rig: &Rig| rig.inner.robot.joints.iter().map(|joint| joint.name.clone()).collect::<Vec<String>>();
         let known = rig.map(names);
-        let (joints, known_joints) = (joints.unwrap_or_default(), known.unwrap_or_default());
-        let table = TableOptions {
-            joints: joints.clone(),
-            known_joints: known_joints.clone(),
-            angles: if degrees { Angles::Degrees(Vec::new()) } else { Angles::default() },
-            episodes: episodes.unwrap_or_default(),
-            ..TableOptions::default()
-        };
-        let bag = BagOptions {
-            joint_topic,
-            joints,
-            known_joints,
-            pose_topic,
-            frames,
-            camera_topics: camera_topics.into_iter().flatten().collect(),
-            join,
+        let options = OpenOptions {
+            joints: joints.unwrap_or_default(),
+            known_joints: known.unwrap_or_default(),
+            cameras: Vec::new(),
+            bag: BagOptions {
+                joint_topic,
+                pose_topic,
+                frames,
+                camera_topics: camera_topics.into_iter().flatten().collect(),
+                join,
+            },
+            table: TableOptions {
+                angles: if degrees { Angles::Degrees(Vec::new()) } else { Angles::default() },
+                episodes: episodes.unwrap_or_default(),
+                ..TableOptions::default()
+            },
         };
         let paths = match paths {
             Paths::One(path) => vec![path],
@@ -96,13 +96,7 @@ impl Recording {
         let mut notes = Vec::new();
         let read = py.detach(|| {
             recording::Recording::read_all_with(&paths, &mut |path| {
-                let opened: Opened = match Format::of(path) {
-                    Format::JsonLines => return recording::Recording::read(path),
-                    Format::Bag => Bag::read(path, &bag)?.into(),
-                    Format::Csv => Table::read_csv(path, &table)?.into(),
-                    Format::Parquet => Table::read_parquet(path, &table)?.into(),
-                    Format::LeRobot => Table::read_lerobot(path, &table)?.into(),
-                };
+                let opened = recording::Recording::open_with(path, &options)?;
                 notes.extend(opened.notes.iter().map(|note| format!("{}: {note}", path.display())));
                 Ok(opened.recording)
             })

@@ -1,11 +1,12 @@
 //! `handeye detect`: images as a recording.
 use super::answer::Answer;
-use super::inputs::{check_output, read_camera};
+use super::inputs::check_output;
+use super::reading::Reading;
 use super::written::written;
 use clap::{Args, ValueEnum};
 use handeye::Error;
 use handeye::detect::{Folder, Gray, Pattern, detect_in_folders};
-use handeye::recording::{Bag, BagOptions, Format, Opened, Pairing, RecordedCamera, Recording};
+use handeye::recording::{Format, Found, OpenOptions, Opened, Pairing, Recording, Rows};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -26,7 +27,8 @@ Examples:
   handeye detect images/left images/right --pattern tag36h11 --states joints.csv -o motions.jsonl
   handeye detect images --pattern checkerboard=9x6 --states joints.csv --pair time -o motions.jsonl
   handeye detect hand=shots --pattern charuco=7x5:DICT_5X5_100:0.75 --camera hand=hand.yaml --side 0.03 --states poses.csv -o motions.jsonl
-  handeye detect motions.mcap --pattern tag36h11 -o motions.jsonl")]
+  handeye detect images --pattern tag36h11 --states joints.csv --degrees --joints q1,q2,q3 -o motions.jsonl
+  handeye detect motions.mcap --pattern tag36h11 --camera-topic /left/image_raw/compressed=left -o motions.jsonl")]
 pub struct Detect {
     /// Folders of images, each of the camera that is named or called as the folder is; a folder of such folders; or a bag (.mcap)
     #[arg(value_name = "[CAMERA=]FOLDER|BAG", required = true)]
@@ -40,12 +42,11 @@ pub struct Detect {
     /// How images find their row of the states
     #[arg(long, value_name = "HOW", default_value = "order", requires = "states")]
     pair: How,
-    /// What is known of a camera: a calibration file (ROS, OpenCV, Kalibr)
-    #[arg(long, value_name = "NAME=FILE")]
-    camera: Vec<String>,
     /// The side of a tag, or of a board's squares [m]: writes the poses of targets too, of cameras whose intrinsics are known
     #[arg(long, value_name = "METRES", value_parser = metres)]
     side: Option<f64>,
+    #[command(flatten)]
+    reading: Reading,
     /// The recording to write
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
@@ -66,17 +67,19 @@ impl Detect {
         let inputs: Vec<PathBuf> = self.images.iter().map(PathBuf::from).chain(self.states.clone()).collect();
         check_output(&self.output, &inputs)?;
         let patterns = self.patterns()?;
-        let cameras = self.camera.iter().map(|text| read_camera(text)).collect::<Result<Vec<_>, _>>()?;
-        let bags = self.images.iter().filter(|image| Format::of(Path::new(image)) == Format::Bag).count();
-        let (mut recording, mut notes) = match (bags, &self.images[..]) {
-            (0, _) => self.in_folders(&patterns)?,
-            (_, [bag]) if self.states.is_none() => in_bag(Path::new(bag), &patterns)?,
+        let options = self.reading.options()?;
+        let is_bag = |file: &&Path| Format::of(file) == Format::Bag;
+        let images = self.images.iter().map(Path::new);
+        let read: Vec<&Path> = images.filter(is_bag).chain(self.states.as_deref()).collect();
+        self.reading.refuse_without_effect(&read)?;
+        let (mut recording, mut notes) = match (&read[..], &self.images[..]) {
+            ([bag], [_]) if self.states.is_none() => in_bag(bag, &patterns, &options)?,
+            (read, _) if read.len() == usize::from(self.states.is_some()) => self.in_folders(&patterns, options)?,
             _ => {
                 let problem = "a bag goes alone, with the states that it has itself";
                 return Err(Error::Unusable(problem.to_owned()));
             }
         };
-        describe(&mut recording, &cameras)?;
         if recording.samples.is_empty() {
             return Err(Error::NotEnoughData(format!("no image shows {}", self.pattern.join(" or "))));
         }
@@ -117,56 +120,42 @@ impl Detect {
         Ok(patterns)
     }
 
-    fn in_folders(&self, patterns: &[Pattern]) -> Result<(Recording, Vec<String>), Error> {
+    fn in_folders(&self, patterns: &[Pattern], options: OpenOptions) -> Result<(Recording, Vec<String>), Error> {
         let mut folders = Vec::new();
         for image in &self.images {
             let named = image.split_once('=').filter(|_| !Path::new(image).exists());
             let (camera, folder) = named.map_or((None, image.as_str()), |(camera, folder)| (Some(camera), folder));
             folders.extend(Folder::open(Path::new(folder), camera)?);
         }
-        let states = self.states.as_ref().map(|path| Recording::open(path, &[])).transpose()?;
+        // What is known of cameras is known of those of the images.
+        let OpenOptions { cameras: known, .. } = options.clone();
+        let of_states = OpenOptions { cameras: Vec::new(), ..options };
+        let states = self.states.as_ref().map(|path| Recording::open_with(path, &of_states)).transpose()?;
         let (cameras, seen) = detect_in_folders(&folders, patterns)?;
         let pairing = match self.pair {
             How::Order => Pairing::Order,
             How::Name => Pairing::Name,
             How::Time => Pairing::Time,
         };
-        let rows = states.as_ref().map(|opened| (&opened.recording, &opened.images[..], pairing));
+        let rows = states.as_ref().map(|opened| Rows { states: &opened.recording, names: &opened.images, pairing });
         let file = self.states.as_deref().unwrap_or(Path::new("images")).display();
-        let (recording, mut notes) = Recording::from_images(cameras, &seen, rows)
+        let (mut recording, mut notes) = Recording::from_images(cameras, &seen, rows)
             .map_err(|problem| Error::Unusable(format!("{file}: {problem}")))?;
+        recording.describe_cameras(&known).map_err(|problem| Error::Unusable(format!("--camera: {problem}")))?;
         notes.extend(states.into_iter().flat_map(|Opened { notes, .. }| notes));
         Ok((recording, notes))
     }
 }
 
-fn in_bag(path: &Path, patterns: &[Pattern]) -> Result<(Recording, Vec<String>), Error> {
+fn in_bag(path: &Path, patterns: &[Pattern], options: &OpenOptions) -> Result<(Recording, Vec<String>), Error> {
     let look = |bytes: &&[u8]| {
         let image = Gray::decode(bytes)?;
-        Ok(patterns.iter().flat_map(|pattern| pattern.detect(&image)).collect())
+        let features = patterns.iter().flat_map(|pattern| pattern.detect(&image)).collect();
+        Ok(Found { size: image.size(), features })
     };
     let mut detect = |images: &[&[u8]]| images.par_iter().map(look).collect::<Vec<Result<_, String>>>();
-    let options = BagOptions::default();
-    let Bag { recording, notes } = Bag::detect(path, &options, &mut detect)?;
+    let Opened { recording, notes, .. } = Recording::detect_with(path, options, &mut detect)?;
     Ok((recording, notes))
-}
-
-/// Adds what the options know of the cameras.
-fn describe(recording: &mut Recording, cameras: &[RecordedCamera]) -> Result<(), Error> {
-    for known in cameras {
-        let name = &known.name;
-        let Some(camera) = recording.cameras.iter_mut().find(|camera| camera.name == *name) else {
-            return Err(Error::Unusable(format!("--camera {name}: there are no images of this camera")));
-        };
-        if let (Some(said), Some(size)) = (known.size, camera.size)
-            && said != size
-        {
-            let problem = format!("--camera {name}: is of {said:?} pixels, and its images are of {size:?}");
-            return Err(Error::Unusable(problem));
-        }
-        *camera = RecordedCamera { size: camera.size.or(known.size), ..known.clone() };
-    }
-    Ok(())
 }
 
 fn metres(text: &str) -> Result<f64, String> {

@@ -2,7 +2,7 @@
 use super::answer::remark;
 use handeye::Error;
 use handeye::intrinsics::read_intrinsics;
-use handeye::recording::{Opened, RecordedCamera, Recording, Sample};
+use handeye::recording::{OpenOptions, Opened, RecordedCamera, Recording, Sample};
 use handeye::rig::{Rig, catalog, matches, replace_file};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -35,10 +35,11 @@ pub fn read_recordings(paths: &[PathBuf], rig: Option<&RigInput>) -> Result<Reco
 
 /// The same where parameters that match any of `new` may be of cameras that the rig does not have yet.
 pub fn read_recordings_with_new(paths: &[PathBuf], rig: Option<&RigInput>, new: &[String]) -> Result<Recording, Error> {
-    let known_joints: Vec<String> =
+    let known_joints =
         rig.map_or_else(Vec::new, |input| input.rig.robot.joints.iter().map(|joint| joint.name.clone()).collect());
+    let options = OpenOptions { known_joints, ..OpenOptions::default() };
     let recording = Recording::read_all_with(paths, &mut |path| {
-        let Opened { recording, notes, .. } = Recording::open(path, &known_joints)?;
+        let Opened { recording, notes, .. } = Recording::open_with(path, &options)?;
         notes.iter().for_each(|note| remark(&format!("{}: {note}", path.display())));
         Ok(recording)
     })?;

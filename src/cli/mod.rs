@@ -18,6 +18,7 @@ mod inputs;
 mod monitor;
 mod noise;
 mod progress;
+mod reading;
 mod servo;
 mod simulate;
 mod suggest;

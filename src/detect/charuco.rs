@@ -1,9 +1,9 @@
 //! ChArUco boards: checkerboards whose bright squares bear tags, which say where on the board a corner is.
 use super::Seen;
 use super::gray::Gray;
+use super::homography::Homography;
 use super::quads::Quad;
-use super::saddle::refined;
-use super::square::Square;
+use super::saddle::refine_subpixel;
 use super::tags::Family;
 
 /// A ChArUco board in OpenCV's layout (since 4.6): the square at the upper left is dark, and the bright ones bear tags 0, 1, 2 row by row.
@@ -65,7 +65,7 @@ impl Charuco {
             let margin = 0.5 * (1.0 / self.ratio - 1.0);
             let place = |is_after: bool| if is_after { 1.0 + margin } else { -margin };
             let [x, y] = [place(at_column == column), place(at_row == row)];
-            let guess = Square::new(&quad)?.at([x, y]);
+            let guess = Homography::new(&quad)?.at([x, y]);
             let distance = |corner: &[f64; 2]| (corner[0] - guess[0]).hypot(corner[1] - guess[1]);
             gap = gap.min(quad.iter().map(distance).fold(f64::INFINITY, f64::min));
             guesses.push(guess);
@@ -73,7 +73,7 @@ impl Charuco {
         let count = guesses.len() as f64;
         let guess = [0, 1].map(|axis| guesses.iter().map(|guess| guess[axis]).sum::<f64>() / count);
         // Edges of tags stay out of the window, which is two pixels at least.
-        refined(image, guess, (0.6 * gap).clamp(2.0, 6.0)).filter(|_| !guesses.is_empty())
+        refine_subpixel(image, guess, (0.6 * gap).clamp(2.0, 6.0)).filter(|_| !guesses.is_empty())
     }
 
     /// The tag on a square.

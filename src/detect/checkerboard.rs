@@ -1,7 +1,7 @@
 //! Checkerboards, by the corners between four squares.
 use super::Seen;
 use super::gray::Gray;
-use super::saddle::refined;
+use super::saddle::refine_subpixel;
 use calib_targets_chessboard::{
     ChessboardDetector, ChessboardParams, DetectorConfig, GrayImageView, default_chess_config, detect_corners,
 };
@@ -42,7 +42,7 @@ impl Checkerboard {
         }
         let Some(grid) = self.grid(image) else { return Vec::new() };
         let name = |row: usize, column: usize| format!("corner:{row}/{column}");
-        let grid = self.refined(image, &grid);
+        let grid = self.refine_subpixel(image, &grid);
         let corners = (0..self.rows).flat_map(|row| (0..self.columns).map(move |column| (row, column)));
         corners.map(|(row, column)| (name(row, column), grid[row * self.columns + column])).collect()
     }
@@ -86,7 +86,7 @@ impl Checkerboard {
     }
 
     /// The corners where the image shows them, in windows that stay within half a square.
-    fn refined(&self, image: &Gray, grid: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    fn refine_subpixel(&self, image: &Gray, grid: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let corner = |index: usize| {
             let (row, column) = (index / self.columns, index % self.columns);
             let beside = [
@@ -97,7 +97,7 @@ impl Checkerboard {
             ];
             let distance = |other: usize| (grid[other][0] - grid[index][0]).hypot(grid[other][1] - grid[index][1]);
             let nearest = beside.into_iter().flatten().map(distance).fold(f64::INFINITY, f64::min);
-            refined(image, grid[index], (0.4 * nearest).clamp(2.0, 6.0)).unwrap_or(grid[index])
+            refine_subpixel(image, grid[index], (0.4 * nearest).clamp(2.0, 6.0)).unwrap_or(grid[index])
         };
         (0..grid.len()).map(corner).collect()
     }

@@ -1,7 +1,8 @@
 //! Folders of images, one per camera.
+use super::names::Names;
 use super::{Gray, Pattern};
 use crate::Error;
-use crate::recording::{ImageSeen, RecordedCamera, natural_order};
+use crate::recording::{Found, ImageSeen, RecordedCamera, natural_order, px};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,7 +15,7 @@ const ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
 pub struct Folder {
     /// The camera's name.
     pub camera: String,
-    /// The images, by their names in natural order.
+    /// The images.
     pub files: Vec<PathBuf>,
 }
 
@@ -62,7 +63,8 @@ fn list(folder: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>), Error> {
     Ok((files, folders))
 }
 
-/// What all images show, by name and then by camera; and the cameras, with the sizes of their images.
+/// What all images show, in the order of their names (of numbers where all are, 99 before 100) and then of cameras; and the cameras, with the
+/// sizes of their images.
 ///
 /// Images are looked at on all cores of the current pool; the result does not depend on how many there are.
 ///
@@ -73,67 +75,62 @@ pub fn detect_in_folders(
     patterns: &[Pattern],
 ) -> Result<(Vec<RecordedCamera>, Vec<ImageSeen>), Error> {
     let mut cameras: Vec<RecordedCamera> = Vec::new();
-    let mut images: BTreeMap<usize, Vec<(PathBuf, ImageSeen, [u32; 2])>> = BTreeMap::new();
-    for (index, folder) in folders.iter().enumerate() {
+    for folder in folders {
         if cameras.iter().any(|camera| camera.name == folder.camera) {
             return Err(Error::Unusable(format!("two folders are of camera `{}`", folder.camera)));
         }
+        refuse_same_names(folder)?;
         cameras.push(RecordedCamera { name: folder.camera.clone(), ..RecordedCamera::default() });
-        let looked = folder.files.par_iter().map(|file| {
+    }
+    let stems: Vec<Vec<String>> =
+        folders.iter().map(|folder| folder.files.iter().map(|file| stem(file)).collect()).collect();
+    let names = Names::new(stems.iter().flatten().map(String::as_str));
+    let mut seen: Vec<ImageSeen> = Vec::new();
+    for (index, (folder, stems)) in folders.iter().zip(&stems).enumerate() {
+        let look = |file: &PathBuf| {
             let bytes = std::fs::read(file).map_err(|source| Error::io(file, source))?;
             let image =
                 Gray::decode(&bytes).map_err(|problem| Error::Unusable(format!("{}: {problem}", file.display())))?;
             let features = patterns.iter().flat_map(|pattern| pattern.detect(&image)).collect();
-            let name = file.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-            let time = time_of(&name);
-            Ok((
-                file.clone(),
-                ImageSeen { camera: index as u32, name, time, features },
-                [image.width as u32, image.height as u32],
-            ))
-        });
-        images.insert(index, looked.collect::<Vec<Result<_, Error>>>().into_iter().collect::<Result<_, _>>()?);
-    }
-    let mut seen: Vec<ImageSeen> = Vec::new();
-    for (index, images) in images {
-        for pair in images.windows(2) {
-            let [(_, before, _), (file, after, _)] = pair else { continue };
-            if before.name == after.name {
-                return Err(Error::Unusable(format!(
-                    "{}: another image is called `{}` too",
-                    file.display(),
-                    after.name
-                )));
-            }
-        }
-        for (file, image, size) in images {
-            let known = *cameras[index].size.get_or_insert(size);
+            Ok(Found { size: image.size(), features })
+        };
+        let looked: Vec<Result<Found, Error>> = folder.files.par_iter().map(look).collect();
+        for ((file, name), looked) in folder.files.iter().zip(stems).zip(looked) {
+            let Found { size, features } = looked?;
+            let camera = &mut cameras[index];
+            let known = *camera.size.get_or_insert(size);
             if known != size {
-                let [width, height] = size;
                 return Err(Error::Unusable(format!(
-                    "{}: is of {width} x {height} pixels, and others of camera `{}` are of {} x {}",
+                    "{}: is of {}, and others of camera `{}` are of {}",
                     file.display(),
-                    cameras[index].name,
-                    known[0],
-                    known[1]
+                    px(size),
+                    camera.name,
+                    px(known)
                 )));
             }
-            seen.push(image);
+            seen.push(ImageSeen { camera: index as u32, name: name.clone(), time: names.time(name), features });
         }
     }
-    seen.sort_by(|a, b| natural_order(&a.name, &b.name).then(a.camera.cmp(&b.camera)));
+    seen.sort_by(|a, b| names.order(&a.name, &b.name).then(a.camera.cmp(&b.camera)));
     Ok((cameras, seen))
 }
 
-/// The time that a name is [s]: `1700000000.25`, or a count of s, ms, µs or ns since 1970, which their number of digits tells apart.
-fn time_of(name: &str) -> Option<f64> {
-    let is_number = !name.is_empty() && name.chars().all(|c| c.is_ascii_digit() || c == '.');
-    let number: f64 = name.parse().ok().filter(|_| is_number)?;
-    Some(match name.len() {
-        _ if name.contains('.') => number,
-        12..=13 => number / 1e3,
-        15..=16 => number / 1e6,
-        18..=19 => number / 1e9,
-        _ => number,
-    })
+/// The name of a file without folder and ending.
+fn stem(file: &Path) -> String {
+    file.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned())
+}
+
+fn refuse_same_names(folder: &Folder) -> Result<(), Error> {
+    let mut met: BTreeMap<String, &Path> = BTreeMap::new();
+    for file in &folder.files {
+        let name = stem(file);
+        if let Some(before) = met.get(&name) {
+            let (before, file, camera) = (before.display(), file.display(), &folder.camera);
+            return Err(Error::Unusable(format!(
+                "{before} and {file}: camera `{camera}` has two images called `{name}`"
+            )));
+        }
+        met.insert(name, file);
+    }
+    Ok(())
 }

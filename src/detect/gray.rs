@@ -33,6 +33,11 @@ impl Gray {
         Ok(Gray { width: image.width() as usize, height: image.height() as usize, pixels: image.into_raw() })
     }
 
+    /// Width and height [px].
+    pub fn size(&self) -> [u32; 2] {
+        [self.width as u32, self.height as u32]
+    }
+
     pub(super) fn at(&self, x: usize, y: usize) -> u8 {
         self.pixels[y * self.width + x]
     }

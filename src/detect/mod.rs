@@ -6,9 +6,10 @@ mod checkerboard;
 mod dark;
 mod folders;
 mod gray;
+mod homography;
+mod names;
 mod quads;
 mod saddle;
-mod square;
 mod tags;
 mod targets;
 

@@ -16,7 +16,7 @@ const FILL: [f64; 2] = [0.85, 1.15];
 
 /// All dark regions that are quadrilaterals, their sides fitted to the edges between dark and bright.
 pub(super) fn quads(image: &Gray) -> Vec<Quad> {
-    regions(image).iter().filter_map(outline).filter_map(|quad| refined(image, &quad)).collect()
+    regions(image).iter().filter_map(outline).filter_map(|quad| refine_edges(image, &quad)).collect()
 }
 
 /// The quadrilateral around a region, to a pixel.
@@ -103,7 +103,7 @@ fn largest(hull: &[[f64; 2]]) -> Option<Quad> {
 }
 
 /// The quadrilateral with its sides where the brightness changes most; `None` where there are no such edges.
-fn refined(image: &Gray, rough: &Quad) -> Option<Quad> {
+fn refine_edges(image: &Gray, rough: &Quad) -> Option<Quad> {
     let mut quad = *rough;
     // A region is half a pixel smaller to each side than what it is of, and its outline a pixel off here and there.
     let shortest = (0..4).map(|k| distance(quad[k], quad[(k + 1) % 4])).fold(f64::INFINITY, f64::min);

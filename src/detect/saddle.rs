@@ -6,7 +6,7 @@ const STEPS: usize = 20;
 
 /// Where the brightness around a corner changes only across lines through it: the least squares of the gradients' parts towards the corner
 /// (Förstner), in a window of so many pixels to each side. `None` where there is no corner, or it is farther than half of that away.
-pub(super) fn refined(image: &Gray, rough: [f64; 2], half: f64) -> Option<[f64; 2]> {
+pub(super) fn refine_subpixel(image: &Gray, rough: [f64; 2], half: f64) -> Option<[f64; 2]> {
     let mut corner = rough;
     let reach = half.ceil() as i32;
     for _ in 0..STEPS {

@@ -1,12 +1,12 @@
 //! Square tags: AprilTags and the dictionaries of ArUco.
 use super::Seen;
 use super::gray::Gray;
+use super::homography::Homography;
 use super::quads::{Quad, quads};
-use super::square::Square;
 use calib_targets_aruco::{Matcher, builtins};
 use nalgebra::{Matrix3, Vector3};
 
-/// Families of tags: what they are called here, in OpenCV, and how many wrong bits are put right.
+/// Families of tags: what they are called here and in OpenCV, and `max_hamming`, how many wrong bits are put right.
 ///
 /// Names of AprilTags are those of their detector's messages, and so is the order of their corners. Few bits are put right where codes
 /// are near to one another: of ArUco's only as many as a quarter of what tells two of its codes apart.
@@ -58,10 +58,10 @@ impl Family {
 
     /// The family of a name, its own or OpenCV's, in any case.
     pub fn of(name: &str) -> Option<Family> {
-        let (name, dictionary, wrong) = FAMILIES
+        let (name, dictionary, max_hamming) = FAMILIES
             .iter()
             .find(|(own, theirs, _)| own.eq_ignore_ascii_case(name) || theirs.eq_ignore_ascii_case(name))?;
-        Some(Family { name, matcher: Matcher::new(builtins::builtin_dictionary(dictionary)?, *wrong) })
+        Some(Family { name, matcher: Matcher::new(builtins::builtin_dictionary(dictionary)?, *max_hamming) })
     }
 
     /// Its name.
@@ -121,12 +121,12 @@ impl Family {
 /// The bits inside of a dark border, row by row from the lowest bit on, dark ones 1; `None` where there is no dark border, or nothing bright
 /// around it.
 fn code(image: &Gray, quad: &Quad, bits: usize) -> Option<u64> {
-    let square = Square::new(quad)?;
+    let homography = Homography::new(quad)?;
     let cells = bits + 2;
     let at = |column: f64, row: f64| {
         let part = |place: f64| place / cells as f64;
         let near = [[-0.15, -0.15], [0.15, -0.15], [-0.15, 0.15], [0.15, 0.15]];
-        let samples = near.map(|[x, y]| image.sample(square.at([part(column + x), part(row + y)])));
+        let samples = near.map(|[x, y]| image.sample(homography.at([part(column + x), part(row + y)])));
         samples.into_iter().sum::<Option<f64>>().map(|sum| sum / 4.0)
     };
     // The light on dark and on bright, which may change over the tag: planes through the border and through what is around it.

@@ -32,6 +32,11 @@ impl Recording {
         Ok(Recording { features, samples, ..self })
     }
 
+    /// The same of a recording that was read from a file, which messages name.
+    pub(super) fn checked_as(self, file: &str) -> Result<Recording, Error> {
+        self.checked().map_err(|error| Error::Unusable(format!("{file}: {error}")))
+    }
+
     fn problem_of_header(&self) -> Option<String> {
         let cameras: Vec<&str> = self.cameras.iter().map(|camera| camera.name.as_str()).collect();
         problem_of_names("joints", self.joints.iter().map(String::as_str), problem_of_joint_name)
@@ -96,6 +101,15 @@ impl Recording {
                 return Some(format!("camera `{camera}` has feature `{feature}` twice"));
             }
         }
+        let mut targets: Vec<_> = sample.targets.iter().map(|seen| (seen.camera, seen.target.as_str())).collect();
+        if let Some(problem) = targets.iter().find_map(|(_, target)| problem_of_name(target)) {
+            return Some(problem);
+        }
+        targets.sort_unstable();
+        if let Some(pair) = targets.windows(2).find(|pair| pair[0] == pair[1]) {
+            let (camera, target) = pair[0];
+            return Some(format!("camera `{}` has target `{target}` twice", self.cameras[camera as usize].name));
+        }
         None
     }
 }
@@ -117,7 +131,8 @@ fn problem_of_names<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::{Detection, RecordedCamera};
+    use crate::recording::{Detection, RecordedCamera, TargetDetection};
+    use handeye_solvers::Pose;
 
     fn recording() -> Recording {
         let detection = |feature| Detection { camera: 0, feature, pixel: [f64::from(feature), 1.0] };
@@ -145,7 +160,7 @@ mod tests {
     #[test]
     fn what_a_file_could_not_say_is_refused() {
         type Fault = fn(&mut Recording);
-        let faults: [(Fault, &str); 8] = [
+        let faults: [(Fault, &str); 9] = [
             (
                 |it| it.samples[1].joints = Some(vec![0.0; 2]),
                 "sample 1: `joints` has 2 numbers, and there are 1 joints",
@@ -154,6 +169,14 @@ mod tests {
             (|it| it.samples[1].pixels[0].feature = 3, "sample 1: feature 3 of 3"),
             (|it| it.samples[1].pixels[0].camera = 1, "sample 1: camera 1 of 1"),
             (|it| it.samples[0].pixels[0].feature = 1, "sample 0: camera `left` has feature `f2` twice"),
+            (
+                |it| {
+                    let seen =
+                        TargetDetection { camera: 0, target: "tag".into(), pose: Pose::identity(), covariance: None };
+                    it.samples[1].targets = vec![seen.clone(), seen];
+                },
+                "sample 1: camera `left` has target `tag` twice",
+            ),
             (|it| it.features[0] = "f1".into(), "two features are called `f1`"),
             (|it| it.joints[0] = "tip".into(), "a joint cannot be called `tip`, which is the parent of that name"),
             (|it| it.samples.clear(), "a recording has at least one sample"),

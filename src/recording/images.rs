@@ -1,10 +1,10 @@
 //! What images show, with where the robot was at the time.
-use super::bag::{Group, Image, assemble, groups};
+use super::groups::{Group, Image, groups, samples};
 use super::names::Names;
 use super::track::{At, Track};
 use super::{RecordedCamera, Recording, Sample};
 use handeye_solvers::Pose;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What one image shows.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,40 +30,42 @@ pub enum Pairing {
     Time,
 }
 
+/// Where the robot was when images were taken.
+#[derive(Clone, Copy, Debug)]
+pub struct Rows<'a> {
+    /// Their joints, poses and actions; the rest is nothing to images.
+    pub states: &'a Recording,
+    /// The name of the image that each goes with, for [`Pairing::Name`].
+    pub names: &'a [String],
+    /// How images find them.
+    pub pairing: Pairing,
+}
+
 impl Recording {
-    /// Joins images with the joints, poses and actions of `states`, whose other content is left out; `names`: of its rows, for
-    /// [`Pairing::Name`].
+    /// Joins images with the joints, poses and actions of rows.
     ///
     /// Images that show nothing are left out, with their rows. By [`Pairing::Time`] images of several cameras make one sample where their times
-    /// are within half the time between two images of one camera; otherwise where they have one name. Without states, samples are in the order
+    /// are within half the time between two images of one camera; otherwise where they have one name. Without rows, samples are in the order
     /// of `images`, whose names come in their order.
     ///
-    /// Returned are the recording and notes. Errors: what does not fit, in words.
+    /// Returned are the recording, without samples where no image shows anything, and notes. Errors: what does not fit, in words.
     pub fn from_images(
         cameras: Vec<RecordedCamera>,
         images: &[ImageSeen],
-        states: Option<(&Recording, &[String], Pairing)>,
+        rows: Option<Rows>,
     ) -> Result<(Recording, Vec<String>), String> {
-        let by_time = matches!(states, Some((_, _, Pairing::Time)));
-        let mut order: Vec<&str> = Vec::new();
-        let mut places: BTreeMap<&str, i64> = BTreeMap::new();
-        for image in images {
-            places.entry(image.name.as_str()).or_insert_with(|| {
-                order.push(&image.name);
-                order.len() as i64 - 1
-            });
-        }
+        let by_time = rows.is_some_and(|rows| rows.pairing == Pairing::Time);
+        let order = in_order_of_names(images);
+        let stamps = if by_time { times(images)? } else { numbers(images, &order) };
         let mut features = Names::default();
-        let mut stamped = Vec::with_capacity(images.len());
-        for image in images {
-            let stamp = match (by_time, image.time) {
-                (false, _) => places[image.name.as_str()],
-                (true, Some(time)) => (time * 1e9) as i64,
-                (true, None) => return Err(format!("the name of image `{}` is no time", image.name)),
-            };
-            let features = image.features.iter().map(|(name, pixel)| (features.intern(name), *pixel)).collect();
-            stamped.push(Image { stamp, source: image.camera as usize, features });
-        }
+        let stamped: Vec<Image> = images
+            .iter()
+            .zip(stamps)
+            .map(|(image, stamp)| {
+                let features = image.features.iter().map(|(name, pixel)| (features.intern(name), *pixel)).collect();
+                Image { stamp, source: image.camera as usize, features }
+            })
+            .collect();
         let camera_of_source: Vec<u32> = (0..cameras.len() as u32).collect();
         let groups = groups(&stamped, &camera_of_source, (!by_time).then_some(0));
         let mut notes = Vec::new();
@@ -71,25 +73,59 @@ impl Recording {
         if blank > 0 {
             notes.push(format!("{blank} of {} images show nothing of what is looked for", images.len()));
         }
-        let rows = match states {
+        let found = match rows {
             None => groups.iter().map(|_| Sample::default()).collect(),
-            Some((states, _, Pairing::Order)) => in_order(&groups, order.len(), states)?,
-            Some((states, names, Pairing::Name)) => by_name(&groups, &order, states, names)?,
-            Some((states, _, Pairing::Time)) => at_times(&groups, states, &mut notes)?,
+            Some(Rows { states, pairing: Pairing::Order, .. }) => in_order(&groups, order.len(), states)?,
+            Some(Rows { states, names, pairing: Pairing::Name }) => by_name(&groups, &order, states, names)?,
+            Some(Rows { states, pairing: Pairing::Time, .. }) => {
+                let moment = |group: &Group| Moment { name: &images[group.images[0]].name, time: group.time };
+                at_times(&groups.iter().map(moment).collect::<Vec<_>>(), states, &mut notes)?
+            }
         };
-        let empty = rows.iter().map(|_| (None, None));
-        let (mut samples, features, _) = assemble(&groups, &stamped, features, &camera_of_source, empty);
-        for (sample, row) in samples.iter_mut().zip(rows) {
-            let time = if by_time { sample.time } else { row.time };
-            let (pixels, points, targets) = (std::mem::take(&mut sample.pixels), Vec::new(), Vec::new());
-            *sample = Sample { time, pixels, points, targets, ..row };
+        let states = found.iter().map(|_| (None, None));
+        let (of_images, features, _) = samples(&groups, stamped, features, &camera_of_source, states);
+        let join = |(Sample { time, pixels, .. }, row): (Sample, Sample)| Sample {
+            time: if by_time { time } else { row.time },
+            pixels,
+            points: Vec::new(),
+            targets: Vec::new(),
+            ..row
+        };
+        let samples: Vec<Sample> = of_images.into_iter().zip(found).map(join).collect();
+        let joints = rows.map_or_else(Vec::new, |rows| rows.states.joints.clone());
+        let recording = Recording { joints, cameras, features, samples };
+        if recording.samples.is_empty() {
+            return Ok((recording, notes));
         }
-        let joints = states.map_or_else(Vec::new, |(states, _, _)| states.joints.clone());
-        Ok((Recording { joints, cameras, features, samples }, notes))
+        Ok((recording.checked().map_err(|error| error.to_string())?, notes))
     }
 }
 
-/// The rows of names that are counted by stamps.
+/// The names of all images, each once.
+fn in_order_of_names(images: &[ImageSeen]) -> Vec<&str> {
+    let mut met = BTreeSet::new();
+    images.iter().map(|image| image.name.as_str()).filter(|name| met.insert(*name)).collect()
+}
+
+/// The times of images [ns].
+fn times(images: &[ImageSeen]) -> Result<Vec<i64>, String> {
+    let time = |image: &ImageSeen| {
+        let seconds = image.time.ok_or_else(|| {
+            let name = &image.name;
+            format!("the name of image `{name}` is no time, in seconds or as a count of ms, µs or ns since 1970 as all others are")
+        })?;
+        Ok((seconds * 1e9) as i64)
+    };
+    images.iter().map(time).collect()
+}
+
+/// In place of times the number of each image's name in their order: images of one name are then at the same time, and no others.
+fn numbers(images: &[ImageSeen], order: &[&str]) -> Vec<i64> {
+    let numbers: BTreeMap<&str, i64> = order.iter().enumerate().map(|(number, name)| (*name, number as i64)).collect();
+    images.iter().map(|image| numbers[image.name.as_str()]).collect()
+}
+
+/// The rows of groups whose times are numbers of names.
 fn in_order(groups: &[Group], names: usize, states: &Recording) -> Result<Vec<Sample>, String> {
     let rows = states.samples.len();
     if rows != names {
@@ -129,40 +165,67 @@ fn by_name(groups: &[Group], order: &[&str], states: &Recording, names: &[String
     groups.iter().map(row).collect()
 }
 
+/// When images were taken [ns], and what the first of them is called.
+struct Moment<'a> {
+    name: &'a str,
+    time: i64,
+}
+
 /// Joints and poses at the times of the images, interpolated.
-fn at_times(groups: &[Group], states: &Recording, notes: &mut Vec<String>) -> Result<Vec<Sample>, String> {
-    let moments: Vec<i64> = groups.iter().map(|group| group.time).collect();
+fn at_times(images: &[Moment], states: &Recording, notes: &mut Vec<String>) -> Result<Vec<Sample>, String> {
+    let moments: Vec<i64> = images.iter().map(|image| image.time).collect();
     let mut joints: Track<Vec<f64>> = Track::new(moments.len());
     let mut poses: Track<Pose> = Track::new(moments.len());
     for sample in &states.samples {
         let Some(time) = sample.time else { continue };
         let time = (time * 1e9) as i64;
         if let Some(read) = &sample.joints {
-            joints.add(&moments, time, read.clone());
+            joints.add(&moments, time, read);
         }
-        if let Some(pose) = sample.pose {
+        if let Some(pose) = &sample.pose {
             poses.add(&moments, time, pose);
         }
     }
+    let spans = [joints.span(), poses.span()];
+    let (Some(first), Some(last)) =
+        (spans.iter().flatten().map(|span| span[0]).min(), spans.iter().flatten().map(|span| span[1]).max())
+    else {
+        return Err("no row has a time and joints or a pose".to_owned());
+    };
     let (joints, poses) = (joints.at(&moments), poses.at(&moments));
-    let gap = |gaps: Vec<Option<i64>>| gaps.into_iter().flatten().max().unwrap_or(0);
-    let largest = gap(joints.iter().map(|at| at.as_ref().map(|at| at.gap)).collect())
-        .max(gap(poses.iter().map(|at| at.as_ref().map(|at| at.gap)).collect()));
-    let outside = joints.iter().zip(&poses).filter(|(joints, pose)| joints.is_none() && pose.is_none()).count();
-    if outside == groups.len() {
-        let first = |times: &mut dyn Iterator<Item = f64>| times.next().unwrap_or(f64::NAN);
+    let seconds = |nanoseconds: i64| nanoseconds as f64 / 1e9;
+    let is_outside = |index: &usize| joints[*index].is_none() && poses[*index].is_none();
+    let off = |index: usize| (first.saturating_sub(moments[index])).max(moments[index].saturating_sub(last));
+    let outside: Vec<usize> = (0..images.len()).filter(is_outside).collect();
+    if outside.len() == images.len()
+        && let Some(&nearest) = outside.iter().min_by_key(|index| off(**index))
+    {
         return Err(format!(
-            "no image was taken while the robot was recorded: images begin at {} s, rows at {} s",
-            first(&mut moments.iter().map(|moment| *moment as f64 / 1e9)),
-            first(&mut states.samples.iter().filter_map(|sample| sample.time))
+            "no image was taken while the robot was recorded, from {} s to {} s: the nearest, `{}` of {} s, is {} s off",
+            seconds(first),
+            seconds(last),
+            images[nearest].name,
+            seconds(moments[nearest]),
+            seconds(off(nearest))
         ));
     }
-    if outside > 0 {
-        notes
-            .push(format!("{outside} of {} samples are outside of the time that the robot was recorded", groups.len()));
+    if let Some(&farthest) = outside.iter().max_by_key(|index| off(**index)) {
+        notes.push(format!(
+            "{} of {} samples are outside of the time that the robot was recorded, image `{}` by {} s",
+            outside.len(),
+            images.len(),
+            images[farthest].name,
+            seconds(off(farthest))
+        ));
     }
-    if largest > 0 {
-        notes.push(format!("states are interpolated, between two that are up to {:.6} s apart", largest as f64 / 1e9));
+    let gap = |index: usize| {
+        let [joints, pose] = [joints[index].as_ref().map(|at| at.gap), poses[index].as_ref().map(|at| at.gap)];
+        joints.max(pose).unwrap_or(0)
+    };
+    let widest = (0..images.len()).rev().max_by_key(|index| gap(*index)).filter(|index| gap(*index) > 0);
+    if let Some(widest) = widest {
+        let (name, apart) = (images[widest].name, seconds(gap(widest)));
+        notes.push(format!("states are interpolated, between two that are up to {apart:.6} s apart (image `{name}`)"));
     }
     let row = |(joints, pose): (Option<At<Vec<f64>>>, Option<At<Pose>>)| Sample {
         joints: joints.map(|at| at.value),

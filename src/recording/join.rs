@@ -1,5 +1,5 @@
 //! Several recordings of one rig as one.
-use super::names::Names;
+use super::names::{Names, natural_order};
 use super::{RecordedCamera, Recording, Sample};
 use crate::Error;
 use std::path::{Path, PathBuf};
@@ -115,7 +115,7 @@ impl Sample {
         }
         self.pixels.sort_unstable_by_key(|detection| (detection.camera, detection.feature));
         self.points.sort_unstable_by_key(|detection| (detection.camera, detection.feature));
-        self.targets.sort_by_key(|detection| detection.camera);
+        self.targets.sort_by(|a, b| a.camera.cmp(&b.camera).then_with(|| natural_order(&a.target, &b.target)));
     }
 
     fn cameras_mut(&mut self) -> impl Iterator<Item = &mut u32> {

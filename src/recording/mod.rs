@@ -1,7 +1,10 @@
 //! Recordings: what was commanded, read and seen; one file per format.
 mod bag;
 mod checked;
+mod clock;
 mod command;
+mod describe;
+mod groups;
 mod images;
 mod join;
 mod jsonl;
@@ -12,11 +15,13 @@ mod table;
 mod track;
 mod types;
 
-pub use bag::{Bag, BagOptions, Detect};
+pub use bag::{BagOptions, Detect, Found};
+pub(crate) use clock::unit_of_date;
 pub use command::Command;
-pub use images::{ImageSeen, Pairing};
+pub(crate) use describe::px;
+pub use images::{ImageSeen, Pairing, Rows};
 pub use jsonl::Reader;
 pub(crate) use names::natural_order;
-pub use open::{Format, Opened};
-pub use table::{Actions, Angles, Table, TableOptions};
+pub use open::{Format, OpenOptions, Opened};
+pub use table::{Actions, Angles, TableOptions};
 pub use types::*;

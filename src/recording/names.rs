@@ -39,6 +39,12 @@ impl Names {
     }
 }
 
+/// A name without what parameter paths cannot hold.
+pub(super) fn tidy(name: &str) -> String {
+    let name = name.replace(|c: char| c == '.' || c == '*' || c.is_control(), "_");
+    if name.is_empty() { "unnamed".to_owned() } else { name }
+}
+
 /// Digits count as numbers: `f2` comes before `f10`.
 pub(crate) fn natural_order(a: &str, b: &str) -> Ordering {
     let (mut left, mut right) = (a, b);

@@ -1,5 +1,5 @@
 //! A recording in whatever format its file's ending names.
-use super::{Bag, BagOptions, Recording, Table, TableOptions};
+use super::{BagOptions, RecordedCamera, Recording, TableOptions, bag, table};
 use crate::Error;
 use std::path::Path;
 
@@ -32,48 +32,51 @@ impl Format {
     }
 }
 
+/// What of a file is meant, where it alone does not tell. Options of one format are nothing to the others, and none but `cameras` is
+/// anything to JSON Lines, where joints stand in the right order.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct OpenOptions {
+    /// Names of the joints from base to tip, some of those in the file; empty: `known_joints`, or all in the order of the file's columns or of
+    /// its first joint state.
+    pub joints: Vec<String>,
+    /// Names that the joints have where the file has all of them, as those of a rig.
+    pub known_joints: Vec<String>,
+    /// What is known of cameras, by name: a lens replaces what the file says of it, a size has to be that of the images.
+    pub cameras: Vec<RecordedCamera>,
+    /// Of bags.
+    pub bag: BagOptions,
+    /// Of tables.
+    pub table: TableOptions,
+}
+
 /// A recording, and what has to be said of how it was read.
 #[derive(Clone, Debug)]
 pub struct Opened {
     /// The recording.
     pub recording: Recording,
-    /// What was left out or taken for granted: one line each. Nothing where it was written by handeye.
+    /// What was left out, taken for granted or interpolated, and where the file ends early: one line each. Nothing where it was written by handeye.
     pub notes: Vec<String>,
-    /// For each sample the name of the image that it goes with, where the file has such names (see [`Table`]); otherwise empty.
+    /// For each sample the name of the image that it goes with, without folder and ending, where a CSV file has a column `image`; otherwise empty.
     pub images: Vec<String>,
 }
 
 impl Recording {
-    /// Reads a recording in any [`Format`] with default options.
+    /// Reads a recording in any [`Format`].
     ///
-    /// `joints`: names of the joints from base to tip, as those of a rig, in whose order they are read from a file that has all of them;
-    /// nothing to JSON Lines, which are in the right order.
-    ///
-    /// Errors: those of [`Recording::read`], [`Bag::read`] and [`Table`].
-    pub fn open(path: &Path, joints: &[String]) -> Result<Opened, Error> {
-        let known_joints = joints.to_vec();
-        let bag = || BagOptions { known_joints: known_joints.clone(), ..BagOptions::default() };
-        let table = || TableOptions { known_joints: known_joints.clone(), ..TableOptions::default() };
+    /// Errors: those of [`Recording::read`]; [`Error::Malformed`] with line and column of a CSV file; [`Error::Unusable`] with row and column of
+    /// a Parquet file, with topic and message of a bag, and for options that name what the file does not have.
+    pub fn open_with(path: &Path, options: &OpenOptions) -> Result<Opened, Error> {
         match Format::of(path) {
             Format::JsonLines => {
-                Ok(Opened { recording: Recording::read(path)?, notes: Vec::new(), images: Vec::new() })
+                let mut recording = Recording::read(path)?;
+                let described = recording.describe_cameras(&options.cameras);
+                described.map_err(|problem| Error::Unusable(format!("{}: {problem}", path.display())))?;
+                Ok(Opened { recording, notes: Vec::new(), images: Vec::new() })
             }
-            Format::Bag => Bag::read(path, &bag()).map(Opened::from),
-            Format::Csv => Table::read_csv(path, &table()).map(Opened::from),
-            Format::Parquet => Table::read_parquet(path, &table()).map(Opened::from),
-            Format::LeRobot => Table::read_lerobot(path, &table()).map(Opened::from),
+            Format::Bag => bag::read(path, options, None),
+            Format::Csv => table::read_csv(path, options),
+            Format::Parquet => table::read_parquet(path, options),
+            Format::LeRobot => table::read_lerobot(path, options),
         }
-    }
-}
-
-impl From<Bag> for Opened {
-    fn from(Bag { recording, notes }: Bag) -> Opened {
-        Opened { recording, notes, images: Vec::new() }
-    }
-}
-
-impl From<Table> for Opened {
-    fn from(Table { recording, images, notes }: Table) -> Opened {
-        Opened { recording, notes, images }
     }
 }

@@ -1,6 +1,6 @@
 //! Bags of ROS 2: read as the recordings that they came from.
 use crate::cli::Folder;
-use handeye::recording::{Bag, BagOptions, Recording};
+use handeye::recording::{BagOptions, OpenOptions, Opened, Recording};
 use handeye::rig::catalog;
 use handeye::simulate::{SimulateOptions, simulate};
 use mcap::records::MessageHeader;
@@ -133,15 +133,15 @@ fn recorded() -> Recording {
     recording
 }
 
-fn read(bytes: &[u8], folder: &Folder) -> Result<Bag, handeye::Error> {
+fn read(bytes: &[u8], folder: &Folder) -> Result<Opened, handeye::Error> {
     // In the order of a rig, so that nothing has to be said of it.
     let known_joints = recorded().joints;
-    read_with(bytes, folder, &BagOptions { known_joints, ..BagOptions::default() })
+    read_with(bytes, folder, &OpenOptions { known_joints, ..OpenOptions::default() })
 }
 
-fn read_with(bytes: &[u8], folder: &Folder, options: &BagOptions) -> Result<Bag, handeye::Error> {
+fn read_with(bytes: &[u8], folder: &Folder, options: &OpenOptions) -> Result<Opened, handeye::Error> {
     std::fs::write(folder.path().join("bag.mcap"), bytes).unwrap();
-    Bag::read(&folder.path().join("bag.mcap"), options)
+    Recording::open_with(&folder.path().join("bag.mcap"), options)
 }
 
 const POSE: &str = "geometry_msgs/Pose pose\n";
@@ -219,8 +219,12 @@ fn states_are_interpolated_to_the_stamps_of_images_and_those_outside_are_left_op
         others.push(("/tip", "geometry_msgs/msg/PoseStamped", pose_text.clone(), time, cdr.bytes));
     }
     let joints = vec!["a".to_owned(), "b".to_owned()];
-    let options = BagOptions { joints, pose_topic: Some("tip".to_owned()), ..BagOptions::default() };
-    let Bag { recording, notes } = read_with(&images_beside(4, &others), &folder, &options).unwrap();
+    let options = OpenOptions {
+        joints,
+        bag: BagOptions { pose_topic: Some("tip".to_owned()), ..BagOptions::default() },
+        ..OpenOptions::default()
+    };
+    let Opened { recording, notes, .. } = read_with(&images_beside(4, &others), &folder, &options).unwrap();
     assert_eq!(recording.joints, ["a", "b"]);
     assert_eq!(recording.samples.len(), 4);
     for (index, sample) in recording.samples.iter().enumerate() {
@@ -238,6 +242,36 @@ fn states_are_interpolated_to_the_stamps_of_images_and_those_outside_are_left_op
     let said = notes.join("\n");
     assert!(said.contains("joint states are interpolated, between two that are up to 0.200000 s apart"), "{said}");
     assert!(said.contains("2 of 4 samples are outside the joint states"), "{said}");
+}
+
+#[test]
+fn states_of_an_arm_and_a_gripper_on_one_topic_are_told_apart_and_those_without_positions_say_nothing() {
+    let folder = Folder::new("bag-two-publishers");
+    let state = format!("{HEADER}{JOINTS}{HEADER_PARTS}");
+    let [arm, gripper] = [["a", "b"], ["finger", "thumb"]].map(|names| names.map(str::to_owned));
+    let mut others = Vec::new();
+    // Every 25 ms, in turns; the arm's joints are the time and its half. The first one has no positions.
+    for index in 0..20_u64 {
+        let time = 900_000_000 + 25_000_000 * index;
+        let seconds = time as f64 / 1e9;
+        let bytes = match index {
+            0 => joint_state(time, &arm, &[]),
+            _ if index % 2 == 0 || index == 1 => joint_state(time, &arm, &[seconds, 0.5 * seconds]),
+            _ => joint_state(time, &gripper, &[100.0, 200.0]),
+        };
+        others.push(("/joint_states", "sensor_msgs/msg/JointState", state.clone(), time, bytes));
+    }
+    // Recorders write what comes late behind what came after it.
+    others[8..].reverse();
+    let Opened { recording, notes, .. } =
+        read_with(&images_beside(4, &others), &folder, &OpenOptions::default()).unwrap();
+    assert_eq!(recording.joints, ["a", "b"]);
+    for (index, sample) in recording.samples.iter().enumerate() {
+        let seconds = 1.0 + 0.1 * index as f64;
+        let [a, b] = sample.joints.as_ref().unwrap()[..] else { panic!() };
+        assert!((a - seconds).abs() < 1e-9 && (b - 0.5 * seconds).abs() < 1e-9, "{a} {b} at {seconds}");
+    }
+    assert!(notes.iter().any(|note| note.contains("10 joint states lack a joint or a position")), "{notes:?}");
 }
 
 #[test]
@@ -260,7 +294,10 @@ fn the_tip_is_found_in_the_tree_of_frames_and_a_way_that_is_not_there_is_refused
         ("/tf", kind, text.clone(), at(2 * EVERY), transform("world", "arm", at(2 * EVERY), [3.0, 2.0, 3.0], 0.4)),
     ];
     let bytes = images_beside(3, &others);
-    let frames = |tip: &str| BagOptions { frames: Some(["base".to_owned(), tip.to_owned()]), ..BagOptions::default() };
+    let frames = |tip: &str| OpenOptions {
+        bag: BagOptions { frames: Some(["base".to_owned(), tip.to_owned()]), ..BagOptions::default() },
+        ..OpenOptions::default()
+    };
     let found = read_with(&bytes, &folder, &frames("tip")).unwrap().recording;
     for (index, sample) in found.samples.iter().enumerate() {
         let part = index as f64 / 2.0;
@@ -287,7 +324,7 @@ fn a_bag_of_every_layout_is_the_recording_that_it_came_from() {
         WriteOptions::new().compression(None).use_chunks(false),
     ];
     for options in layouts {
-        let Bag { recording: found, notes } = read(&bag(&recording, options, false), &folder).unwrap();
+        let Opened { recording: found, notes, .. } = read(&bag(&recording, options, false), &folder).unwrap();
         assert_eq!(found.joints, recording.joints);
         assert_eq!(found.features, recording.features);
         assert_eq!(found.samples.len(), recording.samples.len());
@@ -295,6 +332,7 @@ fn a_bag_of_every_layout_is_the_recording_that_it_came_from() {
             assert_eq!((&found.joints, &found.pixels), (&sample.joints, &sample.pixels));
             assert!((found.time.unwrap() - sample.time.unwrap()).abs() < 1e-9);
         }
+        assert_eq!(found.cameras.len(), recording.cameras.len());
         for (found, camera) in found.cameras.iter().zip(&recording.cameras) {
             assert_eq!(
                 (&found.name, found.size, found.fx, found.cy),
@@ -345,7 +383,7 @@ fn a_bag_that_is_cut_off_anywhere_is_read_as_far_as_it_goes_or_refused_with_the_
     let (mut shorter, mut refused) = (0, 0);
     for end in (0..whole.len()).step_by(997) {
         match read(&whole[..end], &folder) {
-            Ok(Bag { recording: found, notes }) => {
+            Ok(Opened { recording: found, notes, .. }) => {
                 assert!(found.samples.len() <= recording.samples.len());
                 if found.samples.len() < recording.samples.len() {
                     assert!(!notes.is_empty(), "cut at {end}: {} samples and not a word", found.samples.len());

@@ -2,7 +2,7 @@
 use crate::bag::cdr::Cdr;
 use crate::cli::Folder;
 use handeye::camera::CameraModel;
-use handeye::recording::{Bag, BagOptions};
+use handeye::recording::{OpenOptions, Opened, Recording};
 use mcap::WriteOptions;
 use mcap::records::MessageHeader;
 use std::collections::BTreeMap;
@@ -14,7 +14,7 @@ const STANDARD: &str = "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstr
     MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n";
 
 /// Reads a bag of these messages: topic, type, schema, bytes.
-fn read(folder: &Folder, messages: &[(&str, &str, String, Cdr)]) -> Result<Bag, handeye::Error> {
+fn read(folder: &Folder, messages: &[(&str, &str, String, Cdr)]) -> Result<Opened, handeye::Error> {
     let mut writer = WriteOptions::new().create(Cursor::new(Vec::new())).unwrap();
     for (time, (topic, kind, text, cdr)) in messages.iter().enumerate() {
         let schema = writer.add_schema(kind, "ros2msg", text.as_bytes()).unwrap();
@@ -25,11 +25,11 @@ fn read(folder: &Folder, messages: &[(&str, &str, String, Cdr)]) -> Result<Bag, 
     }
     writer.finish().unwrap();
     std::fs::write(folder.path().join("bag.mcap"), writer.into_inner().into_inner()).unwrap();
-    Bag::read(&folder.path().join("bag.mcap"), &BagOptions::default())
+    Recording::open_with(&folder.path().join("bag.mcap"), &OpenOptions::default())
 }
 
 /// Names and pixels of one sample.
-fn seen(bag: &Bag, sample: usize) -> Vec<(&str, [f64; 2])> {
+fn seen(bag: &Opened, sample: usize) -> Vec<(&str, [f64; 2])> {
     let recording = &bag.recording;
     let named = |seen: &handeye::recording::Detection| (recording.features[seen.feature as usize].as_str(), seen.pixel);
     recording.samples[sample].pixels.iter().map(named).collect()

@@ -1,9 +1,5 @@
 //! Features in images: corners of rendered tags and boards, whose places are known, found to a fraction of a pixel and called by their names.
-use crate::cli::Folder;
 use handeye::detect::{Gray, Pattern};
-use handeye::recording::{Bag, BagOptions, Recording};
-use mcap::WriteOptions;
-use mcap::records::MessageHeader;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -11,7 +7,7 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 
 /// Tags as OpenCV prints them (`generateImageMarker`): `#` is dark.
-const TAG36H11: [(u32, [&str; 8]); 3] = [
+pub const TAG36H11: [(u32, [&str; 8]); 3] = [
     (0, ["########", "###.####", "##..#.##", "####.#.#", "####..##", "#.#...##", "#.#.#..#", "########"]),
     (5, ["########", "###..#.#", "##...###", "#..#.#.#", "##..#..#", "#.###..#", "###....#", "########"]),
     (300, ["########", "#.##.#.#", "#####..#", "#......#", "#..#.#.#", "####.###", "#.##.###", "########"]),
@@ -29,12 +25,12 @@ const DICT_5X5: [[&str; 7]; 6] = [
     ["#######", "#...#.#", "##.####", "####.##", "#####.#", "##..#.#", "#######"],
 ];
 
-const SIZE: [usize; 2] = [320, 240];
-const FOCAL: f64 = 400.0;
-const CENTRE: [f64; 2] = [159.5, 119.5];
+pub const SIZE: [usize; 2] = [320, 240];
+pub const FOCAL: f64 = 400.0;
+pub const CENTRE: [f64; 2] = [159.5, 119.5];
 
 /// A dark cell of rows of text.
-fn is_dark(rows: &[&str], x: f64, y: f64) -> bool {
+pub fn is_dark(rows: &[&str], x: f64, y: f64) -> bool {
     let cell = |place: f64, count: usize| (place * count as f64) as usize;
     let (row, column) = (cell(y, rows.len()), cell(x, rows.len()));
     (0.0..1.0).contains(&x) && (0.0..1.0).contains(&y) && rows[row].as_bytes()[column] == b'#'
@@ -42,14 +38,14 @@ fn is_dark(rows: &[&str], x: f64, y: f64) -> bool {
 
 /// Where the plane of a print is before the camera: `camera_from_print`.
 #[derive(Clone, Copy)]
-struct View {
-    rotation: Rotation3<f64>,
-    origin: Vector3<f64>,
+pub struct View {
+    pub rotation: Rotation3<f64>,
+    pub origin: Vector3<f64>,
 }
 
 impl View {
     /// With the middle of a print of this size before the camera, tilted by up to 45°, turned anyhow.
-    fn random(rng: &mut ChaCha8Rng, size: [f64; 2], depth: f64) -> View {
+    pub fn random(rng: &mut ChaCha8Rng, size: [f64; 2], depth: f64) -> View {
         let tilt = rng.random_range(0.0..std::f64::consts::FRAC_PI_4);
         let axis = rng.random_range(0.0..std::f64::consts::TAU);
         let turn = rng.random_range(0.0..std::f64::consts::TAU);
@@ -65,7 +61,7 @@ impl View {
     }
 
     /// Renders a print: dark where `print` says, bright elsewhere, 4 x 4 samples a pixel, then blur and noise.
-    fn render(&self, print: impl Fn(f64, f64) -> bool, blur: f64, noise: f64, rng: &mut ChaCha8Rng) -> Gray {
+    pub fn render(&self, print: impl Fn(f64, f64) -> bool, blur: f64, noise: f64, rng: &mut ChaCha8Rng) -> Gray {
         let columns = [self.rotation * Vector3::x(), self.rotation * Vector3::y(), self.origin];
         let print_from_ray = Matrix3::from_columns(&columns).try_inverse().unwrap();
         let [width, height] = SIZE;
@@ -100,7 +96,7 @@ impl View {
     }
 }
 
-fn png(image: &Gray) -> Vec<u8> {
+pub fn png(image: &Gray) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     let buffer = image::GrayImage::from_raw(image.width as u32, image.height as u32, image.pixels.clone()).unwrap();
     buffer.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
@@ -283,7 +279,7 @@ fn a_checkerboard_that_looks_the_same_turned_by_half_begins_at_its_higher_end() 
 }
 
 /// A ChArUco board of 4 x 3 squares: tags 0 to 5 on its bright squares, row by row.
-fn is_dark_charuco(x: f64, y: f64) -> bool {
+pub fn is_dark_charuco(x: f64, y: f64) -> bool {
     const BRIGHT: [(f64, f64); 6] = [(1.0, 0.0), (3.0, 0.0), (0.0, 1.0), (2.0, 1.0), (1.0, 2.0), (3.0, 2.0)];
     let (big_x, big_y) = (x / CHARUCO, y / CHARUCO);
     let (column, row) = (big_x.floor(), big_y.floor());
@@ -296,7 +292,7 @@ fn is_dark_charuco(x: f64, y: f64) -> bool {
     }
 }
 
-const CHARUCO: f64 = 0.045;
+pub const CHARUCO: f64 = 0.045;
 
 #[test]
 fn corners_of_a_charuco_board_are_named_even_where_only_a_part_of_it_is_seen() {
@@ -318,167 +314,4 @@ fn corners_of_a_charuco_board_are_named_even_where_only_a_part_of_it_is_seen() {
     let found: usize =
         part.iter().map(|(found, _)| found.iter().filter(|(name, _)| name.ends_with("/2")).count()).sum();
     assert!(found >= 16, "{found} of 18 corners");
-}
-
-/// A camera on a hand that sees a board on a table: files in a folder, poses of the hand beside, and where the camera is on the hand.
-fn hand_eye(folder: &Folder, count: u64) -> View {
-    let hand_from_camera =
-        View { rotation: Rotation3::from_euler_angles(0.02, -0.03, 0.5), origin: Vector3::new(0.03, -0.05, 0.08) };
-    let world_from_board =
-        View { rotation: Rotation3::from_euler_angles(3.1, 0.05, 0.3), origin: Vector3::new(0.5, 0.1, 0.02) };
-    std::fs::create_dir_all(folder.path().join("shots/hand")).unwrap();
-    let mut poses = "image,time,pose.x,pose.y,pose.z,pose.qx,pose.qy,pose.qz,pose.qw".to_owned();
-    for seed in 0..count {
-        let mut rng = ChaCha8Rng::seed_from_u64(100 + seed);
-        let view = View::random(&mut rng, [4.0 * CHARUCO, 3.0 * CHARUCO], 0.45 + 0.02 * seed as f64);
-        let image = view.render(is_dark_charuco, 0.8, 2.0, &mut rng);
-        let name = format!("shot-{seed}.png");
-        std::fs::write(folder.path().join("shots/hand").join(&name), png(&image)).unwrap();
-        // world_from_hand = world_from_board · board_from_camera · camera_from_hand, the board's frame at its first inner corner.
-        let first = view.rotation * Vector3::new(CHARUCO, CHARUCO, 0.0) + view.origin;
-        let (board_from_camera, at) = (view.rotation.inverse(), -(view.rotation.inverse() * first));
-        let camera_from_hand = hand_from_camera.rotation.inverse();
-        let camera_to_hand = -(camera_from_hand * hand_from_camera.origin);
-        let rotation = world_from_board.rotation * board_from_camera * camera_from_hand;
-        let origin = world_from_board.rotation * (board_from_camera * camera_to_hand + at) + world_from_board.origin;
-        let quaternion = nalgebra::UnitQuaternion::from_rotation_matrix(&rotation);
-        let q = quaternion.coords;
-        poses += &format!(
-            "\n{name},{seed},{:?},{:?},{:?},{:?},{:?},{:?},{:?}",
-            origin.x, origin.y, origin.z, q.x, q.y, q.z, q.w
-        );
-    }
-    folder.write("poses.csv", &poses);
-    folder.write(
-        "hand.yaml",
-        &format!(
-            "image_width: {}\nimage_height: {}\ncamera_name: hand\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [{FOCAL}, 0, {}, 0, {FOCAL}, {}, 0, 0, 1]\n\
-            distortion_model: plumb_bob\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [0, 0, 0, 0, 0]\n",
-            SIZE[0], SIZE[1], CENTRE[0], CENTRE[1]
-        ),
-    );
-    hand_from_camera
-}
-
-#[test]
-fn images_of_a_board_and_poses_of_the_hand_calibrate_the_hand_to_the_eye() {
-    let folder = Folder::new("detect-hand-eye");
-    let truth = hand_eye(&folder, 10);
-    let (said, _) = folder.expect(
-        0,
-        "detect shots --pattern charuco=4x3:DICT_5X5_50:0.75 --states poses.csv --pair name --camera hand=hand.yaml --side 0.045 -o motions.jsonl",
-    );
-    assert!(said.contains("10 samples, 1 camera with 6 features") && said.contains("target pose"), "{said}");
-    let recording = Recording::read(&folder.path().join("motions.jsonl")).unwrap();
-    let targets = recording.samples.iter().filter(|sample| !sample.targets.is_empty()).count();
-    assert!(targets >= 8, "{targets} of 10 targets");
-    // Without the pixels it is hand-eye calibration as it stands in books.
-    let mut of_targets = recording.clone();
-    of_targets.samples.iter_mut().for_each(|sample| sample.pixels.clear());
-    of_targets.write(&folder.path().join("targets.jsonl")).unwrap();
-    folder.write("rig.toml", "[[cameras]]\nname = \"hand\"\nparent = \"tip\"\n");
-    folder.expect(0, "calibrate targets.jsonl --rig rig.toml -o learned.toml");
-    let learned = handeye::rig::Rig::read(&folder.path().join("learned.toml")).unwrap();
-    let pose = learned.cameras[0].pose.unwrap();
-    let off = (pose.translation - truth.origin).norm();
-    let turned = Rotation3::from_matrix_unchecked(pose.rotation).angle_to(&truth.rotation);
-    assert!(off < 2e-3 && turned < 5e-3, "{off} m and {turned} rad from the truth");
-}
-
-#[test]
-fn compressed_images_in_a_bag_show_what_the_same_files_show() {
-    let folder = Folder::new("detect-bag");
-    hand_eye(&folder, 3);
-    let pattern = "charuco=4x3:DICT_5X5_50:0.75";
-    folder.expect(0, &format!("detect hand=shots/hand --pattern {pattern} -o files.jsonl"));
-    let files = Recording::read(&folder.path().join("files.jsonl")).unwrap();
-    let mut writer = WriteOptions::new().create(Cursor::new(Vec::new())).unwrap();
-    let text = "std_msgs/Header header\nstring format\nuint8[] data\n\
-        ================================================================================\n\
-        MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n\
-        ================================================================================\n\
-        MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n";
-    let schema = writer.add_schema("sensor_msgs/msg/CompressedImage", "ros2msg", text.as_bytes()).unwrap();
-    let channel_id = writer.add_channel(schema, "/hand/image_raw/compressed", "cdr", &BTreeMap::new()).unwrap();
-    for index in 0..4_u32 {
-        // The last one is no image.
-        let path = folder.path().join(format!("shots/hand/shot-{index}.png"));
-        let data = std::fs::read(path).unwrap_or_else(|_| b"no image".to_vec());
-        let mut bytes = vec![0, 1, 0, 0];
-        [1 + index, 0, 1].iter().for_each(|number| bytes.extend(number.to_le_bytes()));
-        // An empty frame, its end and padding; then "png" and its end.
-        bytes.extend([0; 4]);
-        bytes.extend(4_u32.to_le_bytes());
-        bytes.extend(b"png\0");
-        bytes.extend((data.len() as u32).to_le_bytes());
-        bytes.extend(&data);
-        let header = MessageHeader { channel_id, sequence: index, log_time: u64::from(index), publish_time: 0 };
-        writer.write_to_known_channel(&header, &bytes).unwrap();
-    }
-    writer.finish().unwrap();
-    std::fs::write(folder.path().join("bag.mcap"), writer.into_inner().into_inner()).unwrap();
-    let (said, _) = folder.expect(0, &format!("detect bag.mcap --pattern {pattern} -o bag.jsonl"));
-    assert!(said.contains("1 images are left out, the first of which is neither PNG nor JPEG"), "{said}");
-    let bag = Recording::read(&folder.path().join("bag.jsonl")).unwrap();
-    assert_eq!((&bag.features, bag.cameras[0].name.as_str()), (&files.features, "hand"));
-    assert_eq!(bag.samples.len(), 3);
-    for (index, (bag, file)) in bag.samples.iter().zip(&files.samples).enumerate() {
-        assert_eq!((bag.time, &bag.pixels), (Some(1.0 + index as f64), &file.pixels));
-    }
-    // Without a pattern there is nothing in it.
-    let error = Bag::read(&folder.path().join("bag.mcap"), &BagOptions::default()).unwrap_err().to_string();
-    assert!(error.contains("has no image with features") && error.contains("/hand/image_raw/compressed"), "{error}");
-}
-
-#[test]
-fn images_pair_with_rows_by_order_or_time_and_mistakes_are_named() {
-    let folder = Folder::new("detect-pairs");
-    let blank = Gray { width: SIZE[0], height: SIZE[1], pixels: vec![128; SIZE[0] * SIZE[1]] };
-    let rows = TAG36H11[0].1;
-    for camera in ["left", "right"] {
-        std::fs::create_dir_all(folder.path().join("shots").join(camera)).unwrap();
-        for (index, name) in ["10.0", "10.5", "11.0"].into_iter().enumerate() {
-            let mut rng = ChaCha8Rng::seed_from_u64(index as u64);
-            let view = View::random(&mut rng, [0.1; 2], 0.5);
-            let image = view.render(|x, y| is_dark(&rows, 10.0 * x, 10.0 * y), 0.8, 2.0, &mut rng);
-            // The left camera is blind in the middle.
-            let image = if camera == "left" && index == 1 { &blank } else { &image };
-            std::fs::write(folder.path().join(format!("shots/{camera}/{name}.png")), png(image)).unwrap();
-        }
-    }
-    folder.write("rows.csv", "time,joints.a,joint_action.a\n9.75,1,0.5\n10.25,2,0.5\n11.25,4,0.5\n");
-    folder.expect(0, "detect shots --pattern tag36h11 --states rows.csv -o order.jsonl");
-    let order = Recording::read(&folder.path().join("order.jsonl")).unwrap();
-    let joints = |recording: &Recording| -> Vec<f64> {
-        recording.samples.iter().map(|sample| sample.joints.as_ref().unwrap()[0]).collect()
-    };
-    assert_eq!((joints(&order), order.joints.clone()), (vec![1.0, 2.0, 4.0], vec!["a".to_owned()]));
-    assert_eq!(order.samples.iter().map(|sample| sample.pixels.len()).collect::<Vec<_>>(), [8, 4, 8]);
-    assert!(order.samples[0].joint_action.is_some() && order.samples[2].joint_action.is_none());
-    assert_eq!(order.cameras.iter().map(|camera| camera.size).collect::<Vec<_>>(), [Some([320, 240]); 2]);
-    folder.expect(0, "detect shots --pattern tag36h11 --states rows.csv --pair time -o time.jsonl");
-    let time = Recording::read(&folder.path().join("time.jsonl")).unwrap();
-    assert!(joints(&time).iter().zip([1.5, 2.5, 3.5]).all(|(a, b)| (a - b).abs() < 1e-6), "{:?}", joints(&time));
-
-    let fails = |arguments: &str, reasons: &[&str]| {
-        let (_, error) = folder.expect(2, &format!("detect {arguments} -o out.jsonl"));
-        assert!(reasons.iter().all(|reason| error.contains(reason)), "{arguments}: {error}");
-    };
-    fails("shots --pattern tag36h12", &["unknown family of tags `tag36h12`", "did you mean `tag36h1"]);
-    fails("shots --pattern checkerboard=9", &["checkerboard=COLUMNSxROWS"]);
-    fails("shots --pattern charuco=20x20:DICT_4X4_50:0.7", &["needs 200 tags, and DICT_4X4_50 has 50"]);
-    fails("nowhere --pattern tag36h11", &["nowhere"]);
-    fails("left=shots --pattern tag36h11", &["shots: has no images"]);
-    fails("shots --pattern tag36h11 --states rows.csv --pair name", &["rows.csv", "a column `image`"]);
-    fails("shots --pattern tag36h11 --camera top=1x1", &["--camera top: there are no images"]);
-    folder.write("two.csv", "time,joints.a\n1,1\n2,2\n");
-    fails("shots --pattern tag36h11 --states two.csv", &["two.csv: there are 3 images of each camera and 2 rows"]);
-    fails(
-        "shots --pattern tag36h11 --states two.csv --pair time",
-        &["no image was taken while the robot was recorded"],
-    );
-    let (_, error) = folder.expect(1, "detect shots --pattern tag25h9 -o out.jsonl");
-    assert!(error.contains("no image shows tag25h9"), "{error}");
-    folder.write("shots/left/12.0.png", "no image");
-    fails("shots --pattern tag36h11", &["12.0.png: is neither PNG nor JPEG"]);
 }

@@ -1,5 +1,6 @@
 //! What users are promised, one file per promise.
 mod bag;
+mod bag_cameras;
 mod bag_kinds;
 mod calibration;
 mod cli;
@@ -8,6 +9,7 @@ mod cli_infer;
 mod cli_servo;
 mod depth;
 mod detect;
+mod detect_recordings;
 mod determinism;
 mod deviations;
 mod doctor;
@@ -23,6 +25,7 @@ mod infer_rigs;
 mod influence;
 mod intrinsics;
 mod learning;
+mod lerobot;
 mod malformed_input;
 mod monitor;
 mod not_enough;

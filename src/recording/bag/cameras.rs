@@ -1,20 +1,27 @@
 //! Which camera an image is of, and what the bag says of it.
-use super::BagOptions;
-use super::images::{Source, tidy};
+use super::images::{Images, Source};
 use super::kinds::need;
 use super::topics::{Topic, is_topic};
 use super::value::Value;
+use crate::Error;
 use crate::camera::CameraModel;
 use crate::intrinsics::model_of;
-use crate::recording::RecordedCamera;
+use crate::recording::names::tidy;
+use crate::recording::{OpenOptions, RecordedCamera, px};
 use std::collections::BTreeMap;
+use std::path::Path;
 
 /// A sensor_msgs/CameraInfo.
 pub(super) struct Info {
     size: [u32; 2],
-    /// Lens model, [fx, fy, cx, cy] and distortion; `None` of a camera that was not calibrated.
-    intrinsics: Option<(CameraModel, [f64; 4], Vec<f64>)>,
+    /// Of the images as they come; `None` of a camera that was not calibrated.
+    raw: Option<Lens>,
+    /// Of rectified images.
+    rectified: Option<Lens>,
 }
+
+/// Lens model, [fx, fy, cx, cy] and distortion.
+type Lens = (CameraModel, [f64; 4], Vec<f64>);
 
 impl Info {
     pub(super) fn read(message: &Value) -> Result<Info, String> {
@@ -32,9 +39,17 @@ impl Info {
         let &[fx, skew, cx, _, fy, cy, ..] = matrix else {
             return Err(format!("has a camera matrix of {} numbers", matrix.len()));
         };
+        let rectified = match message.numbers("p").or_else(|| message.numbers("P")) {
+            Some(&[fx, _, cx, _, _, fy, cy, ..])
+                if fx > 0.0 && fy > 0.0 && [fx, fy, cx, cy].iter().all(|n| n.is_finite()) =>
+            {
+                Some((CameraModel::Pinhole, [fx, fy, cx, cy], Vec::new()))
+            }
+            _ => None,
+        };
         if fx == 0.0 {
             // As ROS says that the camera is not calibrated.
-            return Ok(Info { size, intrinsics: None });
+            return Ok(Info { size, raw: None, rectified });
         }
         if skew != 0.0 || !(fx > 0.0 && fy > 0.0) || [fx, fy, cx, cy].iter().chain(distortion).any(|n| !n.is_finite()) {
             return Err(format!("has a camera matrix that is none: {matrix:?}"));
@@ -47,12 +62,13 @@ impl Info {
             return Err(format!("has {} distortion coefficients, and `{name}` has {most}", distortion.len()));
         }
         let distortion = distortion.iter().take(most).copied().collect();
-        Ok(Info { size, intrinsics: Some((model, [fx, fy, cx, cy], distortion)) })
+        Ok(Info { size, raw: Some((model, [fx, fy, cx, cy], distortion)), rectified })
     }
 
-    fn camera(&self, name: String) -> RecordedCamera {
+    fn camera(&self, name: String, is_rectified: bool) -> RecordedCamera {
         let size = (!self.size.contains(&0)).then_some(self.size);
-        let Some((model, [fx, fy, cx, cy], distortion)) = &self.intrinsics else {
+        let lens = if is_rectified { &self.rectified } else { &self.raw };
+        let Some((model, [fx, fy, cx, cy], distortion)) = lens else {
             return RecordedCamera { name, size, ..RecordedCamera::default() };
         };
         RecordedCamera {
@@ -71,43 +87,86 @@ impl Info {
 /// The cameras in the order of their names, and for each source the index of its camera.
 ///
 /// A camera is called as the options say, otherwise after the frame of its images, or after the namespace of its topic where the
-/// frame is empty or that of images in several namespaces.
+/// frame is empty or that of images in several namespaces. Its lens is that of the CameraInfo in the same namespace and of the same frame, then
+/// of the same namespace, then of the same frame; not where the options say another.
+///
+/// Errors: [`Error::Unusable`] for a CameraInfo that cannot be read or is of another size than the images, and for images of one camera of
+/// which some are rectified.
 pub(super) fn cameras(
-    sources: &[Source],
-    infos: &BTreeMap<Source, Info>,
-    topics: &[Topic],
-    options: &BagOptions,
-) -> (Vec<RecordedCamera>, Vec<u32>) {
-    let space = |source: &Source| topics[source.0].namespace();
-    let name = |source: &Source| {
-        let given = options.camera_topics.iter().find(|(topic, _)| is_topic(&topics[source.0].name, topic));
-        if let Some((_, Some(name))) = given {
-            return tidy(name);
-        }
-        let is_shared = sources.iter().any(|other| other.1 == source.1 && space(other) != space(source));
-        let is_frame = !source.1.is_empty() && !is_shared;
-        tidy(if is_frame || space(source).is_empty() { &source.1 } else { space(source) })
-    };
-    let names: Vec<String> = sources.iter().map(name).collect();
+    path: &Path,
+    images: &mut Images,
+    options: &OpenOptions,
+) -> Result<(Vec<RecordedCamera>, Vec<u32>), Error> {
+    let (sources, topics) = (&images.sources, &images.topics);
+    let names: Vec<String> = sources.iter().map(|source| name(source, sources, topics, options)).collect();
     let mut sorted = names.clone();
     sorted.sort_by(|a, b| crate::recording::natural_order(a, b));
     sorted.dedup();
-    let camera = |name: &String| {
-        let of_it = || sources.iter().zip(&names).filter(move |(_, known)| *known == name).map(|(source, _)| source);
-        let find = |fits: &dyn Fn(&Source, &Source) -> bool| {
-            of_it().find_map(|source| infos.iter().find(|(info, _)| fits(info, source)).map(|(_, info)| info))
+    let problem = |problem: String| Err(Error::Unusable(format!("{}: {problem}", path.display())));
+    let mut cameras = Vec::new();
+    for name in &sorted {
+        let of_it: Vec<usize> = (0..sources.len()).filter(|source| names[*source] == *name).collect();
+        let topic = |source: usize| &topics[sources[source].0];
+        let first = of_it[0];
+        let is_rectified = topic(first).is_rectified();
+        if let Some(&other) = of_it.iter().find(|source| topic(**source).is_rectified() != is_rectified) {
+            let [one, other] = [first, other].map(|source| topic(source).name.as_str());
+            return problem(format!(
+                "{one} and {other} are both of camera `{name}`, and only one is of rectified images: --camera-topic of `handeye convert` and \
+                 `detect` names one of them"
+            ));
+        }
+        let seen = of_it.iter().find_map(|source| Some((*source, *images.sizes.get(source)?)));
+        let unknown =
+            RecordedCamera { name: name.clone(), size: seen.map(|(_, size)| size), ..RecordedCamera::default() };
+        let is_known = options.cameras.iter().any(|camera| camera.name == *name && camera.has_lens());
+        let Some(key) = info_of(&of_it, sources, topics, &images.infos).filter(|_| !is_known) else {
+            cameras.push(unknown);
+            continue;
         };
-        let is_frame = |info: &Source, source: &Source| info.1 == source.1 && !info.1.is_empty();
-        let is_space = |info: &Source, source: &Source| space(info) == space(source);
-        let info = find(&|info, source| is_frame(info, source) && is_space(info, source))
-            .or_else(|| find(&is_space))
-            .or_else(|| find(&is_frame));
-        info.map_or_else(
-            || RecordedCamera { name: name.clone(), ..RecordedCamera::default() },
-            |info| info.camera(name.clone()),
-        )
-    };
-    let cameras = sorted.iter().map(camera).collect();
+        let camera = match &images.infos[&key] {
+            Ok(info) => info.camera(name.clone(), is_rectified),
+            Err(_) => match images.infos.remove(&key) {
+                Some(Err(error)) => return Err(error),
+                _ => unknown.clone(),
+            },
+        };
+        if let (Some((source, seen)), Some(said)) = (seen, camera.size)
+            && seen != said
+        {
+            let [images, info] = [sources[source].0, key.0].map(|channel| topics[channel].name.as_str());
+            return problem(format!(
+                "{images}: images are of {}, and {info} is of {}; --camera {name}=FILE gives the intrinsics of these images",
+                px(seen),
+                px(said)
+            ));
+        }
+        cameras.push(camera.over(&unknown));
+    }
     let index = |name: &String| sorted.iter().position(|known| known == name).unwrap_or(0) as u32;
-    (cameras, names.iter().map(index).collect())
+    Ok((cameras, names.iter().map(index).collect()))
+}
+
+/// What the camera of a source is called.
+fn name(source: &Source, sources: &[Source], topics: &[Topic], options: &OpenOptions) -> String {
+    let space = |source: &Source| topics[source.0].namespace();
+    let given = options.bag.camera_topics.iter().find(|(topic, _)| is_topic(&topics[source.0].name, topic));
+    if let Some((_, Some(name))) = given {
+        return tidy(name);
+    }
+    let is_shared = sources.iter().any(|other| other.1 == source.1 && space(other) != space(source));
+    let is_frame = !source.1.is_empty() && !is_shared;
+    tidy(if is_frame || space(source).is_empty() { &source.1 } else { space(source) })
+}
+
+/// The CameraInfo that is of a camera's sources.
+fn info_of<T>(of_it: &[usize], sources: &[Source], topics: &[Topic], infos: &BTreeMap<Source, T>) -> Option<Source> {
+    let is_frame = |info: &Source, source: &Source| info.1 == source.1 && !info.1.is_empty();
+    let is_space = |info: &Source, source: &Source| topics[info.0].namespace() == topics[source.0].namespace();
+    let find = |fits: &dyn Fn(&Source, &Source) -> bool| {
+        of_it.iter().find_map(|source| infos.keys().find(|info| fits(info, &sources[*source]))).cloned()
+    };
+    find(&|info, source| is_frame(info, source) && is_space(info, source))
+        .or_else(|| find(&is_space))
+        .or_else(|| find(&is_frame))
 }

@@ -29,7 +29,7 @@ impl Frames {
             self.tracks.insert(child.to_owned(), (frame(transform).to_owned(), edge));
         }
         if let Some((_, Edge::Moving(track))) = self.tracks.get_mut(child) {
-            track.add(moments, stamp(transform)?, pose);
+            track.add(moments, stamp(transform)?, &pose);
         }
         Ok(())
     }

@@ -1,26 +1,21 @@
 //! The first pass over a bag: what images show, and what is said of cameras.
 use super::cameras::Info;
 use super::kinds::{Kind, features, frame, need, stamp};
+use super::labels::Labels;
 use super::messages::{Channel, Visitor};
 use super::topics::{Topic, is_topic};
-use super::{BagOptions, Detect};
+use super::{BagOptions, Detect, Found};
 use crate::Error;
-use crate::recording::names::Names;
+use crate::recording::groups::Image;
+use crate::recording::px;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// What one message says of one image.
-pub(in crate::recording) struct Image {
-    /// [ns]
-    pub stamp: i64,
-    /// Index of its source.
-    pub source: usize,
-    /// By index, with the pixel.
-    pub features: Vec<(u32, [f64; 2])>,
-}
-
 /// A topic (by index) and a frame: images of one camera.
 pub(super) type Source = (usize, String);
+
+/// A CameraInfo, or why it is none: that matters where it is of images.
+type Said = Result<Info, Error>;
 
 /// A PNG or JPEG, and where it belongs.
 struct Pending {
@@ -38,9 +33,13 @@ pub(super) struct Images<'a> {
     options: &'a BagOptions,
     pub topics: Vec<Topic>,
     pub images: Vec<Image>,
-    pub features: Names,
+    pub features: Labels,
     pub sources: Vec<Source>,
-    pub infos: BTreeMap<Source, Info>,
+    /// The size of each source's images, where they were looked at.
+    pub sizes: BTreeMap<usize, [u32; 2]>,
+    pub infos: BTreeMap<Source, Said>,
+    /// Of the last image, whose memory the next one takes.
+    seen: Vec<(u32, [f64; 2])>,
     /// Pixels that are no numbers.
     pub not_finite: usize,
     /// Looks for features in images; where it is not given, those of detectors' messages are taken.
@@ -57,9 +56,11 @@ impl<'a> Images<'a> {
             options,
             topics: Vec::new(),
             images: Vec::new(),
-            features: Names::default(),
+            features: Labels::default(),
             sources: Vec::new(),
+            sizes: BTreeMap::new(),
             infos: BTreeMap::new(),
+            seen: Vec::new(),
             not_finite: 0,
             detect,
             pending: Vec::new(),
@@ -68,21 +69,33 @@ impl<'a> Images<'a> {
     }
 
     /// Looks at the images that wait, and says how many could not be looked at so far.
-    pub(super) fn finish(&mut self) -> Option<String> {
-        self.look();
+    pub(super) fn finish(&mut self) -> Result<Option<String>, Error> {
+        self.look()?;
         let (count, why) = &self.undecoded;
-        (*count > 0).then(|| format!("{count} images are left out, the first of which {why}"))
+        Ok((*count > 0).then(|| format!("{count} images are left out, the first of which {why}")))
     }
 
-    fn look(&mut self) {
-        let Some(detect) = &mut self.detect else { return };
+    /// Errors: [`Error::Unusable`] for an image of another size than those before it.
+    fn look(&mut self) -> Result<(), Error> {
+        let Some(detect) = &mut self.detect else { return Ok(()) };
         let pending = std::mem::take(&mut self.pending);
         let bytes: Vec<&[u8]> = pending.iter().map(|image| image.bytes.as_slice()).collect();
         let found = detect(&bytes);
         for (Pending { stamp, source, .. }, found) in pending.iter().zip(found) {
             match found {
-                Ok(seen) => {
-                    let features = seen.iter().map(|(name, pixel)| (self.features.intern(name), *pixel)).collect();
+                Ok(Found { size, features }) => {
+                    let known = *self.sizes.entry(*source).or_insert(size);
+                    if known != size {
+                        let (file, topic) = (self.path.display(), &self.topics[self.sources[*source].0].name);
+                        let seconds = *stamp as f64 / 1e9;
+                        return Err(Error::Unusable(format!(
+                            "{file}: {topic}: the image of {seconds:.6} s is of {}, and those before are of {}",
+                            px(size),
+                            px(known)
+                        )));
+                    }
+                    let features =
+                        features.iter().map(|(name, pixel)| (self.features.names.intern(name), *pixel)).collect();
                     self.images.push(Image { stamp: *stamp, source: *source, features });
                 }
                 Err(why) => {
@@ -93,20 +106,22 @@ impl<'a> Images<'a> {
                 }
             }
         }
+        Ok(())
     }
 
     fn is_meant(&self, topic: &str) -> bool {
         let named = &self.options.camera_topics;
         named.is_empty() || named.iter().any(|(known, _)| is_topic(topic, known))
     }
+}
 
-    fn source(&mut self, channel: usize, frame: &str) -> usize {
-        let known = self.sources.iter().position(|(topic, known)| *topic == channel && known == frame);
-        known.unwrap_or_else(|| {
-            self.sources.push((channel, frame.to_owned()));
-            self.sources.len() - 1
-        })
-    }
+/// The index of a source, which is added where it is new.
+fn source(sources: &mut Vec<Source>, channel: usize, frame: &str) -> usize {
+    let known = sources.iter().position(|(topic, known)| *topic == channel && known == frame);
+    known.unwrap_or_else(|| {
+        sources.push((channel, frame.to_owned()));
+        sources.len() - 1
+    })
 }
 
 impl Visitor for Images<'_> {
@@ -120,40 +135,47 @@ impl Visitor for Images<'_> {
         let topic = &self.topics[channel];
         match topic.kind {
             Some(Kind::CompressedImage) if self.detect.is_some() && self.is_meant(&topic.name) => {
-                let (stamp, frame, bytes) = topic.decode(self.path, time, data, |message| {
-                    Ok((stamp(message)?, frame(message).to_owned(), need(message.bytes("data"), "data")?.to_vec()))
+                let image = topic.decode(self.path, time, data, |message| {
+                    let bytes = need(message.bytes("data"), "data")?.to_vec();
+                    Ok(Pending {
+                        stamp: stamp(message)?,
+                        source: source(&mut self.sources, channel, frame(message)),
+                        bytes,
+                    })
                 })?;
-                let source = self.source(channel, &frame);
-                self.pending.push(Pending { stamp, source, bytes });
+                self.pending.push(image);
                 if self.pending.len() >= TOGETHER {
-                    self.look();
+                    self.look()?;
                 }
             }
             Some(kind) if kind.is_of_images() && self.detect.is_none() && self.is_meant(&topic.name) => {
-                let (stamp, frame, seen) = topic.decode(self.path, time, data, |message| {
-                    Ok((stamp(message)?, frame(message).to_owned(), features(kind, message)?))
+                let seen = &mut self.seen;
+                seen.clear();
+                let (stamp, source) = topic.decode(self.path, time, data, |message| {
+                    features(kind, message, &mut |label, pixel| match pixel.iter().all(|number| number.is_finite()) {
+                        true => seen.push((self.features.index(label), pixel)),
+                        false => self.not_finite += 1,
+                    })?;
+                    Ok((stamp(message)?, source(&mut self.sources, channel, frame(message))))
                 })?;
-                let source = self.source(channel, &frame);
-                let number = seen.len();
-                let is_finite = |pixel: &[f64; 2]| pixel.iter().all(|number| number.is_finite());
-                let seen = seen.into_iter().filter(|(_, pixel)| is_finite(pixel));
-                let features: Vec<_> = seen.map(|(name, pixel)| (self.features.intern(&tidy(&name)), pixel)).collect();
-                self.not_finite += number - features.len();
-                self.images.push(Image { stamp, source, features });
+                // As long as it is, and no longer.
+                self.images.push(Image { stamp, source, features: seen.as_slice().to_vec() });
             }
             Some(Kind::CameraInfo) => {
-                let (frame, info) = topic
-                    .decode(self.path, time, data, |message| Ok((frame(message).to_owned(), Info::read(message)?)))?;
-                self.infos.entry((channel, frame)).or_insert(info);
+                // It is said again with every image.
+                let is_known = |of: &str| self.infos.keys().any(|(known, frame)| *known == channel && frame == of);
+                if topic.decode_head(data, |message| is_known(frame(message))) == Some(true) {
+                    return Ok(());
+                }
+                let mut of = String::new();
+                let info = topic.decode(self.path, time, data, |message| {
+                    frame(message).clone_into(&mut of);
+                    Info::read(message)
+                });
+                self.infos.entry((channel, of)).or_insert(info);
             }
             _ => {}
         }
         Ok(())
     }
-}
-
-/// A name without what parameter paths cannot hold.
-pub(super) fn tidy(name: &str) -> String {
-    let name = name.replace(|c: char| c == '.' || c == '*' || c.is_control(), "_");
-    if name.is_empty() { "unnamed".to_owned() } else { name }
 }

@@ -1,4 +1,5 @@
 //! The kinds of messages that a recording is made of, and what is taken from each.
+use super::labels::Label;
 use super::value::Value;
 use crate::geometry::orientation;
 use handeye_solvers::Pose;
@@ -50,8 +51,10 @@ impl Kind {
                 "distortion_model",
                 "d",
                 "k",
+                "p",
                 "D",
                 "K",
+                "P",
                 "binning_x",
                 "binning_y",
                 "roi",
@@ -82,9 +85,8 @@ pub(super) fn frame<'a>(message: &Value<'a>) -> &'a str {
     message.text("header.frame_id").unwrap_or_default().trim_start_matches('/')
 }
 
-/// What an image shows: names and pixels.
-pub(super) fn features(kind: Kind, message: &Value) -> Result<Vec<(String, [f64; 2])>, String> {
-    let mut features = Vec::new();
+/// What an image shows: `see` takes each feature with its pixel.
+pub(super) fn features(kind: Kind, message: &Value, see: &mut impl FnMut(Label, [f64; 2])) -> Result<(), String> {
     let Some(detections) = message.list("detections") else {
         return Err("has no field `detections` of the usual type".to_owned());
     };
@@ -93,31 +95,30 @@ pub(super) fn features(kind: Kind, message: &Value) -> Result<Vec<(String, [f64;
             Kind::Tags => {
                 let family = detection.text("family").unwrap_or("tag");
                 let id = need(detection.number("id"), "detections.id")?;
-                for (corner, pixel) in corners(detection)?.into_iter().enumerate() {
-                    features.push((format!("{family}:{id}/{corner}"), pixel));
-                }
+                corners(detection, |corner, pixel| see(Label::Corner(family, id, corner), pixel))?;
             }
             _ => {
-                let pixel = |axis: &str| {
-                    let field = detection.number(&format!("bbox.center.position.{axis}"));
-                    need(field.or_else(|| detection.number(&format!("bbox.center.{axis}"))), "detections.bbox.center")
-                };
-                features.push((need(name(detection), "detections.id")?.to_owned(), [pixel("x")?, pixel("y")?]));
+                let centre = need(detection.at("bbox.center"), "detections.bbox.center")?;
+                let centre = centre.at("position").unwrap_or(centre);
+                let pixel = |axis: &str| need(centre.number(axis), "detections.bbox.center");
+                see(Label::Text(need(name(detection), "detections.id")?), [pixel("x")?, pixel("y")?]);
             }
         }
     }
-    Ok(features)
+    Ok(())
 }
 
 /// The four corners, `float64[8]` or `Point[4]`.
-fn corners(detection: &Value) -> Result<Vec<[f64; 2]>, String> {
+fn corners(detection: &Value, mut see: impl FnMut(usize, [f64; 2])) -> Result<(), String> {
     let field = "detections.corners";
     if let Some(numbers) = detection.numbers("corners") {
-        return Ok(numbers.as_chunks().0.to_vec());
+        numbers.as_chunks().0.iter().enumerate().for_each(|(corner, pixel)| see(corner, *pixel));
+        return Ok(());
     }
-    let points = need(detection.list("corners"), field)?;
-    let corner = |point: &Value| Ok([need(point.number("x"), field)?, need(point.number("y"), field)?]);
-    points.iter().map(corner).collect()
+    for (corner, point) in need(detection.list("corners"), field)?.iter().enumerate() {
+        see(corner, [need(point.number("x"), field)?, need(point.number("y"), field)?]);
+    }
+    Ok(())
 }
 
 /// The identity of a detection, or what it is most probably of.

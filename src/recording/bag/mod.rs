@@ -6,22 +6,20 @@ mod cameras;
 mod frames;
 mod images;
 mod kinds;
+mod labels;
 mod messages;
-mod samples;
 mod schema;
 mod states;
 mod topics;
 mod value;
 
-use super::names::Names;
+use super::groups::{Group, groups, samples};
+use super::names::tidy;
 use super::track::At;
-use super::{Detection, Recording, Sample};
+use super::{OpenOptions, Opened, Recording};
 use crate::Error;
-use handeye_solvers::Pose;
-pub(super) use images::Image;
-use images::{Images, tidy};
+use images::Images;
 use kinds::Kind;
-pub(super) use samples::{Group, groups};
 use states::States;
 use std::path::Path;
 use topics::choose;
@@ -31,10 +29,6 @@ use topics::choose;
 pub struct BagOptions {
     /// The topic of joint states; not needed where there is only one.
     pub joint_topic: Option<String>,
-    /// Names of the joints from base to tip, some of those in the bag; empty: `known_joints`, or those of the first joint state.
-    pub joints: Vec<String>,
-    /// Names that the joints have where the bag has all of them, as those of a rig.
-    pub known_joints: Vec<String>,
     /// The topic of tip poses (PoseStamped). Where none is named and there are no joint states, the only one is taken.
     pub pose_topic: Option<String>,
     /// The frames of the base and the tip, for tip poses from TF.
@@ -45,69 +39,77 @@ pub struct BagOptions {
     pub join: Option<f64>,
 }
 
-/// A bag as a recording, and what has to be said of it.
-#[derive(Clone, Debug)]
-pub struct Bag {
-    /// One sample for each time at which images show features, in their order; times are stamps [s].
-    pub recording: Recording,
-    /// What was left out, where the file ends early, and how far apart the states are that were interpolated: one line each.
-    pub notes: Vec<String>,
+/// What was found in an image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// Its width and height [px].
+    pub size: [u32; 2],
+    /// Names and pixels of features.
+    pub features: Vec<(String, [f64; 2])>,
 }
 
-/// Looks for features in PNG or JPEG images: of each their names and pixels, or why it cannot be looked at, in words.
-pub type Detect<'a> = dyn FnMut(&[&[u8]]) -> Vec<Result<Vec<(String, [f64; 2])>, String>> + 'a;
+/// Looks for features in PNG or JPEG images; of each what it shows, or why it cannot be looked at, in words.
+pub type Detect<'a> = dyn FnMut(&[&[u8]]) -> Vec<Result<Found, String>> + 'a;
 
-impl Bag {
-    /// Reads an MCAP file.
+impl Recording {
+    /// Reads a bag as [`Recording::open_with`] does, with the features that are found in its compressed images (sensor_msgs/CompressedImage), in
+    /// place of those that it holds. Images that cannot be looked at are left out, which is said.
     ///
-    /// Features: the corners of AprilTags `FAMILY:ID/CORNER`, the centres of Detection2D by their id. Joint states are
-    /// interpolated to the images' stamps, tip poses too (slerp). A file that is cut off or damaged is read as far as it goes.
-    ///
-    /// Errors: [`Error::Io`], and [`Error::Unusable`] with file and topic for messages that do not fit their schema, topics that are
-    /// missing or more than one, and a file without images.
-    pub fn read(path: &Path, options: &BagOptions) -> Result<Bag, Error> {
-        read(path, options, None)
-    }
-
-    /// The same with the features that are found in its compressed images (sensor_msgs/CompressedImage), in place of those that it holds.
-    /// Images that cannot be looked at are left out, which is said.
-    pub fn detect<'a>(path: &'a Path, options: &'a BagOptions, detect: &'a mut Detect<'a>) -> Result<Bag, Error> {
+    /// Errors: those of [`Recording::open_with`], and [`Error::Unusable`] for images whose size is not that of those before or of their CameraInfo.
+    pub fn detect_with<'a>(
+        path: &'a Path,
+        options: &'a OpenOptions,
+        detect: &'a mut Detect<'a>,
+    ) -> Result<Opened, Error> {
         read(path, options, Some(detect))
     }
 }
 
-fn read<'a>(path: &'a Path, options: &'a BagOptions, detect: Option<&'a mut Detect<'a>>) -> Result<Bag, Error> {
+/// Reads an MCAP file; what `detect` finds in its images is taken in place of the features that it holds.
+///
+/// Features: the corners of AprilTags `FAMILY:ID/CORNER`, the centres of Detection2D by their id. Samples are the times at which images show
+/// features, in their order, with joint states interpolated to their stamps, tip poses too (slerp). A file that is cut off or damaged is read as
+/// far as it goes.
+///
+/// Errors: [`Error::Io`], and [`Error::Unusable`] with file and topic for messages that do not fit their schema, topics that are
+/// missing or more than one, and a file without images.
+pub(super) fn read<'a>(
+    path: &'a Path,
+    options: &'a OpenOptions,
+    detect: Option<&'a mut Detect<'a>>,
+) -> Result<Opened, Error> {
+    let of_bag = &options.bag;
     let wanted = match detect {
         Some(_) => "compressed image (sensor_msgs/CompressedImage) that shows what is looked for",
         None => "image with features (apriltag_msgs/AprilTagDetectionArray or vision_msgs/Detection2DArray)",
     };
-    let mut images = Images::new(path, options, detect);
+    let mut images = Images::new(path, of_bag, detect);
     let problem = messages::visit(path, &mut images)?;
-    let mut notes: Vec<String> = problem.into_iter().chain(images.finish()).collect();
-    let (cameras, camera_of_source) = cameras::cameras(&images.sources, &images.infos, &images.topics, options);
-    let within = options.join.map(|seconds| (seconds * 1e9) as i64);
+    let mut notes: Vec<String> = problem.into_iter().chain(images.finish()?).collect();
+    let (cameras, camera_of_source) = cameras::cameras(path, &mut images, options)?;
+    let within = of_bag.join.map(|seconds| (seconds * 1e9) as i64);
     let groups = groups(&images.images, &camera_of_source, within);
     if groups.is_empty() {
         let cut_off = notes.first().map_or_else(String::new, |note| format!(", and it {note}"));
         return Err(Error::Unusable(format!(
             "{}: has no {wanted}{}; it has {}{cut_off}",
             path.display(),
-            if options.camera_topics.is_empty() { "" } else { ", on the topics that were named" },
+            if of_bag.camera_topics.is_empty() { "" } else { ", on the topics that were named" },
             topics::list(&images.topics)
         )));
     }
     let topics = &images.topics;
-    let joint_topic = choose(topics, Kind::JointStates, options.joint_topic.as_deref(), "--joint-topic", path)?;
-    let pose_topic = match &options.pose_topic {
-        None if joint_topic.is_some() || options.frames.is_some() => None,
+    let joint_topic = choose(topics, Kind::JointStates, of_bag.joint_topic.as_deref(), "--joint-topic", path)?;
+    let pose_topic = match &of_bag.pose_topic {
+        None if joint_topic.is_some() || of_bag.frames.is_some() => None,
         named => choose(topics, Kind::Pose, named.as_deref(), "--pose-topic", path)?,
     };
     let moments: Vec<i64> = groups.iter().map(|group| group.time).collect();
     let mut states = States::new(path, options, &moments, [joint_topic, pose_topic]);
-    if joint_topic.is_some() || pose_topic.is_some() || options.frames.is_some() {
+    if joint_topic.is_some() || pose_topic.is_some() || of_bag.frames.is_some() {
         messages::visit(path, &mut states)?;
     }
-    let poses = match &options.frames {
+    let poses = match &of_bag.frames {
         Some([base, tip]) => states
             .frames
             .poses(&moments, base.trim_start_matches('/'), tip.trim_start_matches('/'))
@@ -119,7 +121,7 @@ fn read<'a>(path: &'a Path, options: &'a BagOptions, detect: Option<&'a mut Dete
     if joint_topic.is_some() {
         notes.extend(note_on_states("joint states", &joints, states.joints.span(), &moments));
     }
-    if pose_topic.is_some() || options.frames.is_some() {
+    if pose_topic.is_some() || of_bag.frames.is_some() {
         notes.extend(note_on_states("tip poses", &poses, states.poses.span(), &moments));
     }
     for (number, what) in [
@@ -140,42 +142,16 @@ fn read<'a>(path: &'a Path, options: &'a BagOptions, detect: Option<&'a mut Dete
     }
     let states = joints.into_iter().zip(poses);
     let states = states.map(|(joints, pose)| (joints.map(|at| at.value), pose.map(|at| at.value)));
-    let (samples, features, twice) = assemble(&groups, &images.images, images.features, &camera_of_source, states);
+    let (samples, features, twice) = samples(&groups, images.images, images.features.names, &camera_of_source, states);
     if twice > 0 {
         notes.push(format!("{twice} detections are of a feature that the same image has already, and are left out"));
     }
     let joints = names.iter().map(|name| tidy(name)).collect();
-    Ok(Bag { recording: Recording { joints, cameras, features, samples }, notes })
-}
-
-/// The samples, the features that they count by, and how many detections of a feature that its image had already were left out.
-/// `states`: joints and tip pose of each group.
-pub(super) fn assemble(
-    groups: &[Group],
-    images: &[Image],
-    features: Names,
-    camera_of_source: &[u32],
-    states: impl Iterator<Item = (Option<Vec<f64>>, Option<Pose>)>,
-) -> (Vec<Sample>, Vec<String>, usize) {
-    let (features, places) = features.in_natural_order();
-    let detections = |&index: &usize| {
-        let image = &images[index];
-        let camera = camera_of_source[image.source];
-        image.features.iter().map(move |&(feature, pixel)| Detection { camera, feature, pixel })
-    };
-    let mut twice = 0;
-    let sample = |(group, (joints, pose)): (&Group, (Option<Vec<f64>>, Option<Pose>))| {
-        let mut pixels: Vec<Detection> = group.images.iter().flat_map(detections).collect();
-        let before = pixels.len();
-        pixels.sort_by_key(|detection| (detection.camera, detection.feature));
-        pixels.dedup_by_key(|detection| (detection.camera, detection.feature));
-        twice += before - pixels.len();
-        let mut sample = Sample { time: Some(group.time as f64 / 1e9), joints, pose, pixels, ..Sample::default() };
-        sample.renumber(&places);
-        sample
-    };
-    let samples = groups.iter().zip(states).map(sample).collect();
-    (samples, features, twice)
+    let mut recording = Recording { joints, cameras, features, samples };
+    let file = path.display().to_string();
+    let described = recording.describe_cameras(&options.cameras);
+    described.map_err(|problem| Error::Unusable(format!("{file}: {problem}")))?;
+    Ok(Opened { recording: recording.checked_as(&file)?, notes, images: Vec::new() })
 }
 
 fn note_on_groups(groups: &[Group]) -> Option<String> {

@@ -34,7 +34,13 @@ impl Layout {
         let schema =
             MessageSchema::parse(name, text).map_err(|error| format!("its schema cannot be read: {error:#}"))?;
         let mut builder = Builder { schema: &schema, wanted, parts: 0 };
-        builder.message(&schema.spec, "", 0)
+        let mut layout = builder.message(&schema.spec, "", 0)?;
+        if let Layout::Message(fields) = &mut layout {
+            // Behind the last field that is wanted nothing needs to be skipped.
+            let end = fields.iter().rposition(|field| field.is_wanted).map_or(0, |last| last + 1);
+            fields.truncate(end);
+        }
+        Ok(layout)
     }
 }
 

@@ -1,11 +1,11 @@
 //! The second pass over a bag: where the robot was at the moments of the samples.
-use super::BagOptions;
 use super::frames::Frames;
 use super::kinds::{Kind, need, pose, stamp};
 use super::messages::{Channel, Visitor};
 use super::topics::Topic;
-use super::value::Value;
+use super::value::Texts;
 use crate::Error;
+use crate::recording::OpenOptions;
 use crate::recording::track::Track;
 use handeye_solvers::Pose;
 use std::path::Path;
@@ -13,7 +13,7 @@ use std::path::Path;
 /// What the second pass finds.
 pub(super) struct States<'a> {
     path: &'a Path,
-    options: &'a BagOptions,
+    options: &'a OpenOptions,
     /// The moments of the samples [ns], sorted.
     moments: &'a [i64],
     topics: Vec<Topic>,
@@ -22,8 +22,10 @@ pub(super) struct States<'a> {
     pose_topic: Option<&'a str>,
     /// Names of the joints, from base to tip; empty before the first state.
     pub names: Vec<String>,
-    /// The names of the last state, and the place of each joint among them.
-    last: (Vec<String>, Option<Vec<usize>>),
+    /// The names of the last state as they stand in it, and the place of each joint among them, where it has all.
+    last: Option<(Vec<u8>, Option<Vec<usize>>)>,
+    /// The joints of the last state, whose memory the next one takes.
+    state: Vec<f64>,
     pub joints: Track<Vec<f64>>,
     pub poses: Track<Pose>,
     pub frames: Frames,
@@ -32,7 +34,12 @@ pub(super) struct States<'a> {
 }
 
 impl<'a> States<'a> {
-    pub(super) fn new(path: &'a Path, options: &'a BagOptions, moments: &'a [i64], from: [Option<&'a str>; 2]) -> Self {
+    pub(super) fn new(
+        path: &'a Path,
+        options: &'a OpenOptions,
+        moments: &'a [i64],
+        from: [Option<&'a str>; 2],
+    ) -> Self {
         States {
             path,
             options,
@@ -41,7 +48,8 @@ impl<'a> States<'a> {
             joint_topic: from[0],
             pose_topic: from[1],
             names: Vec::new(),
-            last: (Vec::new(), None),
+            last: None,
+            state: Vec::new(),
             joints: Track::new(moments.len()),
             poses: Track::new(moments.len()),
             frames: Frames::default(),
@@ -49,26 +57,28 @@ impl<'a> States<'a> {
         }
     }
 
-    /// The joints of a state, where it has all of them.
-    fn joints(&mut self, names: &[Value], positions: &[f64]) -> Result<Option<Vec<f64>>, String> {
-        let is_text = |(value, known): (&Value, &String)| matches!(value, Value::Text(text) if text == known);
-        if self.last.0.len() != names.len() || !names.iter().zip(&self.last.0).all(is_text) || names.is_empty() {
-            let text = |value: &Value| if let Value::Text(text) = value { (*text).to_owned() } else { String::new() };
-            let names: Vec<String> = names.iter().map(text).collect();
+    /// Reads the joints of a state, and says whether it has all of them.
+    fn read(&mut self, names: Texts, positions: &[f64]) -> Result<bool, String> {
+        // A first state without positions names no joints, and the next one may.
+        let is_last = !self.names.is_empty() && self.last.as_ref().is_some_and(|(last, _)| last == names.bytes);
+        if !is_last {
+            let texts = names.to_vec()?;
             if self.names.is_empty() {
-                self.names = self.order(&names, positions.len())?;
+                self.names = self.order(&texts, positions.len())?;
             }
-            let places = self.names.iter().map(|joint| names.iter().position(|name| name == joint)).collect();
-            self.last = (names, places);
+            let places = self.names.iter().map(|joint| texts.iter().position(|name| name == joint)).collect();
+            self.last = Some((names.bytes.to_vec(), places));
         }
-        let Some(places) = self.last.1.as_ref().filter(|places| !places.is_empty()) else { return Ok(None) };
-        let joints: Option<Vec<f64>> = places.iter().map(|place| positions.get(*place).copied()).collect();
-        Ok(joints.filter(|joints| joints.iter().all(|joint| joint.is_finite())))
+        let places = self.last.as_ref().and_then(|(_, places)| places.as_ref());
+        let Some(places) = places.filter(|places| !places.is_empty()) else { return Ok(false) };
+        self.state.clear();
+        self.state.extend(places.iter().filter_map(|place| positions.get(*place)).filter(|joint| joint.is_finite()));
+        Ok(self.state.len() == places.len())
     }
 
     /// The joints from base to tip: as given, as in the rig where the first state has all of those, or else as in that state.
     fn order(&self, names: &[String], positions: usize) -> Result<Vec<String>, String> {
-        let BagOptions { joints, known_joints, .. } = self.options;
+        let OpenOptions { joints, known_joints, .. } = self.options;
         if let Some(missing) = joints.iter().find(|joint| !names.contains(joint)) {
             let there = names.join(", ");
             return Err(format!("has no joint `{missing}`; it has {there}"));
@@ -99,19 +109,20 @@ impl Visitor for States<'_> {
         let is_from = |named: Option<&str>| named == Some(topic.name.as_str());
         let taken = match kind {
             Kind::JointStates if is_from(self.joint_topic) => topic.decode(path, time, data, |message| {
-                let names = need(message.list("name"), "name")?;
+                let names = need(message.texts("name"), "name")?;
                 let positions = need(message.numbers("position"), "position")?;
-                match self.joints(names, positions)? {
-                    Some(joints) => self.joints.add(moments, stamp(message)?, joints),
-                    None => self.skipped += 1,
+                if self.read(names, positions)? {
+                    self.joints.add(moments, stamp(message)?, &self.state);
+                } else {
+                    self.skipped += 1;
                 }
                 Ok(())
             }),
             Kind::Pose if is_from(self.pose_topic) => topic.decode(path, time, data, |message| {
-                self.poses.add(moments, stamp(message)?, pose(message, "pose.position", "pose.orientation")?);
+                self.poses.add(moments, stamp(message)?, &pose(message, "pose.position", "pose.orientation")?);
                 Ok(())
             }),
-            Kind::Transforms if self.options.frames.is_some() => topic.decode(path, time, data, |message| {
+            Kind::Transforms if self.options.bag.frames.is_some() => topic.decode(path, time, data, |message| {
                 let is_static = topic.name.ends_with("tf_static");
                 let transforms = need(message.list("transforms"), "transforms")?;
                 transforms.iter().try_for_each(|transform| self.frames.add(moments, transform, is_static))

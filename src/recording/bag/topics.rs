@@ -12,6 +12,8 @@ pub(super) struct Topic {
     pub type_name: String,
     pub kind: Option<Kind>,
     layout: Result<Layout, String>,
+    /// Of the header alone, where whole messages need not be looked at.
+    head: Option<Layout>,
     pub messages: usize,
 }
 
@@ -26,7 +28,14 @@ impl Topic {
                 Err(format!("has a schema in `{schema}` and messages in `{message}`, and `ros2msg` and `cdr` are read"))
             }
         };
-        Topic { name: topic, type_name, kind, layout, messages: 0 }
+        let is_repeated = kind == Some(Kind::CameraInfo) && layout.is_ok();
+        let head = is_repeated.then(|| Layout::new(&type_name, &definition, &["header.frame_id"]).ok()).flatten();
+        Topic { name: topic, type_name, kind, layout, head, messages: 0 }
+    }
+
+    /// What `take` makes of a message's header; `None` where it cannot be read by itself.
+    pub(super) fn decode_head<T>(&self, data: &[u8], take: impl FnOnce(&Value) -> T) -> Option<T> {
+        Value::decode(self.head.as_ref()?, data).ok().map(|value| take(&value))
     }
 
     /// Decodes a message, of which `take` makes something.
@@ -57,6 +66,11 @@ impl Topic {
         let name = self.name.trim_start_matches('/');
         let image = name.strip_suffix("/compressed").unwrap_or(name);
         image.rsplit_once('/').map_or("", |(namespace, _)| namespace)
+    }
+
+    /// True for `/left/image_rect`, `/left/image_rect_color/compressed` and what else stands below such a name: images without distortion.
+    pub(super) fn is_rectified(&self) -> bool {
+        self.name.split('/').any(|part| part.starts_with("image_rect"))
     }
 }
 

@@ -8,10 +8,31 @@ use re_ros_msg::message_spec::BuiltInType;
 pub(super) enum Value<'a> {
     Number(f64),
     Text(&'a str),
+    Texts(Texts<'a>),
     Numbers(Vec<f64>),
     Bytes(&'a [u8]),
     List(Vec<Value<'a>>),
     Message(Vec<(&'a str, Value<'a>)>),
+}
+
+/// Texts as they stand in a message: who reads the same ones again and again need not take them apart.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Texts<'a> {
+    pub bytes: &'a [u8],
+    count: usize,
+    is_big: bool,
+}
+
+impl Texts<'_> {
+    /// Errors: what is wrong with the bytes, in words.
+    pub(super) fn to_vec(self) -> Result<Vec<String>, String> {
+        fn list<BO: CdrEndian>(bytes: &[u8], count: usize) -> re_cdr::Result<Vec<String>> {
+            let mut reader = CdrReader::<BO>::new(bytes);
+            (0..count).map(|_| text(&mut reader).map(str::to_owned)).collect()
+        }
+        let of = if self.is_big { list::<BigEndian> } else { list::<LittleEndian> };
+        of(self.bytes, self.count).map_err(|error| format!("does not fit its schema: {error}"))
+    }
 }
 
 impl<'a> Value<'a> {
@@ -23,8 +44,8 @@ impl<'a> Value<'a> {
             return Err(format!("has {} bytes, less than the header of CDR", bytes.len()));
         };
         let value = match [header[0], header[1]] {
-            [0, 0] => value(layout, &mut CdrReader::<BigEndian>::new(body)),
-            [0, 1] => value(layout, &mut CdrReader::<LittleEndian>::new(body)),
+            [0, 0] => value(layout, body, true, &mut CdrReader::<BigEndian>::new(body)),
+            [0, 1] => value(layout, body, false, &mut CdrReader::<LittleEndian>::new(body)),
             [a, b] => return Err(format!("is encoded as {a:02x} {b:02x}, and 00 00 and 00 01 (plain CDR) are known")),
         };
         value.map_err(|error| format!("does not fit its schema: {error}"))
@@ -54,12 +75,22 @@ impl<'a> Value<'a> {
         if let Some(Value::Bytes(bytes)) = self.at(path) { Some(bytes) } else { None }
     }
 
+    pub(super) fn texts(&self, path: &str) -> Option<Texts<'a>> {
+        if let Some(Value::Texts(texts)) = self.at(path) { Some(*texts) } else { None }
+    }
+
     pub(super) fn list(&self, path: &str) -> Option<&[Value<'a>]> {
         if let Some(Value::List(list)) = self.at(path) { Some(list) } else { None }
     }
 }
 
-fn value<'a, BO: CdrEndian>(layout: &'a Layout, reader: &mut CdrReader<'a, BO>) -> re_cdr::Result<Value<'a>> {
+/// `body`: all that is read from, in which texts are found again.
+fn value<'a, BO: CdrEndian>(
+    layout: &'a Layout,
+    body: &'a [u8],
+    is_big: bool,
+    reader: &mut CdrReader<'a, BO>,
+) -> re_cdr::Result<Value<'a>> {
     match layout {
         Layout::Builtin(BuiltInType::String(_)) => Ok(Value::Text(text(reader)?)),
         Layout::Builtin(kind) => Ok(Value::Number(number(kind, reader)?)),
@@ -67,18 +98,26 @@ fn value<'a, BO: CdrEndian>(layout: &'a Layout, reader: &mut CdrReader<'a, BO>) 
             let count = count(*length, reader)?;
             match element.as_ref() {
                 Layout::Builtin(BuiltInType::UInt8 | BuiltInType::Byte) => Ok(Value::Bytes(reader.read_bytes(count)?)),
+                Layout::Builtin(BuiltInType::String(_)) => {
+                    let start = reader.position();
+                    (0..count).try_for_each(|_| bytes(reader).map(|_| ()))?;
+                    Ok(Value::Texts(Texts { bytes: &body[start..reader.position()], count, is_big }))
+                }
                 Layout::Builtin(BuiltInType::Float64) => Ok(Value::Numbers(reader.read_numeric_vec::<f64>(count)?)),
                 Layout::Builtin(kind) if !matches!(kind, BuiltInType::String(_) | BuiltInType::WString(_)) => {
                     Ok(Value::Numbers((0..count).map(|_| number(kind, reader)).collect::<re_cdr::Result<_>>()?))
                 }
-                element => Ok(Value::List((0..count).map(|_| value(element, reader)).collect::<re_cdr::Result<_>>()?)),
+                element => {
+                    let values = (0..count).map(|_| value(element, body, is_big, reader));
+                    Ok(Value::List(values.collect::<re_cdr::Result<_>>()?))
+                }
             }
         }
         Layout::Message(fields) => {
             let mut values = Vec::with_capacity(fields.iter().filter(|field| field.is_wanted).count());
             for Field { name, layout, is_wanted } in fields {
                 if *is_wanted {
-                    values.push((name.as_str(), value(layout, reader)?));
+                    values.push((name.as_str(), value(layout, body, is_big, reader)?));
                 } else {
                     skip(layout, reader)?;
                 }

@@ -1,22 +1,26 @@
 //! What the columns of a table are, by their names.
+use super::Actions;
 use crate::error::suggestion;
-use crate::recording::names::{Names, natural_order};
+use crate::recording::OpenOptions;
+use crate::recording::clock::UNITS;
+use crate::recording::names::{Names, natural_order, tidy};
 use crate::rig::{problem_of_joint_name, problem_of_name};
 use std::collections::BTreeMap;
 
 /// Where in a row each thing stands.
 #[derive(Debug, Default)]
 pub(super) struct Columns {
-    /// With the seconds that one of its units takes.
-    pub time: Option<(usize, f64)>,
+    pub time: Option<Time>,
     pub episode: Option<usize>,
     /// Names of the joints, from base to tip.
     pub joint_names: Vec<String>,
     /// One per joint, or none at all.
     pub joints: Vec<Angle>,
     pub joint_action: Vec<Angle>,
-    /// What `action.NAME` says, which may be a target or a motion.
+    /// What `action.NAME` says, where the options say whether that is a target or a motion.
     pub action: Vec<Angle>,
+    /// Names in `action.NAME`.
+    pub actions: Vec<String>,
     pub pose: Option<PoseColumns>,
     pub pose_action: Option<PoseColumns>,
     pub cameras: Vec<String>,
@@ -27,6 +31,14 @@ pub(super) struct Columns {
     pub targets: Vec<(u32, String, PoseColumns)>,
     /// Columns that say nothing that is known, by name.
     pub others: Vec<String>,
+}
+
+/// The column of times.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Time {
+    pub column: usize,
+    /// The seconds that one of its units takes, where its name says it.
+    pub unit: Option<f64>,
 }
 
 /// The column of a joint, and whether its name says that it is in degrees.
@@ -40,32 +52,32 @@ pub(super) struct Angle {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PoseColumns {
     pub xyz: [usize; 3],
-    pub turn: Turn,
+    pub rotation: Rotation,
 }
 
 impl PoseColumns {
     /// All of them.
     pub(super) fn columns(&self) -> Vec<usize> {
-        let turn = match self.turn {
-            Turn::Quaternion(columns) => columns.to_vec(),
-            Turn::RollPitchYaw(angles) => angles.iter().map(|angle| angle.column).collect(),
+        let rotation = match self.rotation {
+            Rotation::Quaternion(columns) => columns.to_vec(),
+            Rotation::RollPitchYaw(angles) => angles.iter().map(|angle| angle.column).collect(),
         };
-        self.xyz.into_iter().chain(turn).collect()
+        self.xyz.into_iter().chain(rotation).collect()
     }
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Turn {
+pub(super) enum Rotation {
     Quaternion([usize; 4]),
     RollPitchYaw([Angle; 3]),
 }
 
 /// Names of times, without their units.
 const TIMES: &[&str] = &["time", "timestamp", "t"];
-/// Units of times [s].
-const UNITS: &[(&str, f64)] = &[("_s", 1.0), ("_ms", 1e-3), ("_us", 1e-6), ("_ns", 1e-9)];
 /// What LeRobot counts by, which says nothing of a robot.
 const COUNTERS: &[&str] = &["frame_index", "index", "task_index", "sample", "frame"];
+/// What names of LeRobot's columns begin with, of which none is a camera.
+const FOREIGN: &[&str] = &["observation", "next", "annotation", "action"];
 /// What a column of names of images is called.
 pub(super) const IMAGES: &[&str] = &["image", "file", "filename"];
 const ORIGIN: [&str; 3] = ["x", "y", "z"];
@@ -76,9 +88,9 @@ const ROLL_PITCH_YAW: [&str; 3] = ["roll", "pitch", "yaw"];
 pub(super) type Problem = (usize, String);
 
 impl Columns {
-    /// Reads the header. `joints`: names of the joints from base to tip; empty: `known` where the table has all of them, or all
-    /// `joints.NAME` in their order.
-    pub(super) fn new(header: &[String], joints: &[String], known: &[String]) -> Result<Columns, Problem> {
+    /// Reads the header. Joints are those of the options; or those that they know where the table has all of them, or all `joints.NAME` in
+    /// their order.
+    pub(super) fn new(header: &[String], options: &OpenOptions) -> Result<Columns, Problem> {
         let mut columns = Columns::default();
         let mut met: BTreeMap<&str, usize> = BTreeMap::new();
         let mut named_joints = Group::default();
@@ -97,7 +109,7 @@ impl Columns {
                 if columns.time.is_some() {
                     return Err((index, format!("`{name}` is a second column of times")));
                 }
-                columns.time = Some((index, unit));
+                columns.time = Some(Time { column: index, unit });
                 continue;
             }
             match name.split('.').collect::<Vec<_>>()[..] {
@@ -107,6 +119,7 @@ impl Columns {
                 ["joint_action", joint] => joint_action.add(index, joint)?,
                 ["action", joint] => action.add(index, joint)?,
                 [pose @ ("pose" | "pose_action"), part] => poses.entry(pose).or_default().add(index, part)?,
+                [first, ..] if FOREIGN.contains(&first) => columns.others.push(name.to_owned()),
                 [camera, feature, part] => {
                     if let Some(problem) = problem_of_name(camera).or_else(|| problem_of_name(feature)) {
                         return Err((index, problem));
@@ -116,9 +129,12 @@ impl Columns {
                 _ => columns.others.push(name.to_owned()),
             }
         }
-        columns.take_joints(header, &named_joints, joints, known)?;
+        columns.take_joints(header, &named_joints, &options.joints, &options.known_joints)?;
         columns.joint_action = columns.in_order(&joint_action, "joint_action")?;
-        columns.action = columns.in_order(&action, "action")?;
+        columns.actions = action.0.iter().map(|(name, _)| name.clone()).collect();
+        if options.table.actions != Actions::Unsaid {
+            columns.action = columns.in_order(&action, "action")?;
+        }
         for (name, parts) in poses {
             let pose = parts.pose(name)?;
             *(if name == "pose" { &mut columns.pose } else { &mut columns.pose_action }) = Some(pose);
@@ -141,7 +157,7 @@ impl Columns {
         let seen = self.pixels.iter().flat_map(|(_, _, at)| at).chain(self.points.iter().flat_map(|(_, _, at)| at));
         let targets = self.targets.iter().map(|(_, _, pose)| pose);
         let poses = self.pose.iter().chain(&self.pose_action).chain(targets).flat_map(PoseColumns::columns);
-        let single = self.time.map(|(column, _)| column).into_iter().chain(self.episode);
+        let single = self.time.map(|time| time.column).into_iter().chain(self.episode);
         for column in angles.chain(seen.copied()).chain(poses).chain(single) {
             wanted[column] = true;
         }
@@ -178,7 +194,7 @@ impl Columns {
         self.joints = all(&names).unwrap_or_default();
         self.others.retain(|other| !self.joints.iter().any(|joint| header[joint.column] == *other));
         // A column may be asked for by a name that no parameter path can hold.
-        self.joint_names = names.iter().map(|name| name.replace(['.', '*'], "_")).collect();
+        self.joint_names = names.iter().map(|name| tidy(name)).collect();
         for (name, joint) in self.joint_names.iter().zip(&self.joints) {
             if let Some(problem) = problem_of_joint_name(name) {
                 return Err((joint.column, problem));
@@ -276,24 +292,24 @@ impl<'a> Parts<'a> {
     fn pose(&self, of: &str) -> Result<PoseColumns, Problem> {
         let [x, y, z] = ORIGIN.map(|axis| self.need(axis, of));
         let is_rpy = ROLL_PITCH_YAW.iter().any(|angle| self.0.keys().any(|part| part.starts_with(angle)));
-        let turn = if is_rpy {
+        let rotation = if is_rpy {
             let [roll, pitch, yaw] = ROLL_PITCH_YAW.map(|part| self.angle(part, of));
-            Turn::RollPitchYaw([roll?, pitch?, yaw?])
+            Rotation::RollPitchYaw([roll?, pitch?, yaw?])
         } else {
             let [x, y, z, w] = QUATERNION.map(|part| self.need(part, of));
-            Turn::Quaternion([x?, y?, z?, w?])
+            Rotation::Quaternion([x?, y?, z?, w?])
         };
-        Ok(PoseColumns { xyz: [x?, y?, z?], turn })
+        Ok(PoseColumns { xyz: [x?, y?, z?], rotation })
     }
 }
 
-/// The seconds that one unit of a column of times takes; `None` of any other column.
-fn unit_of_time(name: &str) -> Option<f64> {
+/// The unit of a column of times, where its name says it [s]; `None` of any other column.
+fn unit_of_time(name: &str) -> Option<Option<f64>> {
     let of_time = |name: &str| TIMES.contains(&name);
-    let unit = UNITS.iter().find_map(|(suffix, unit)| Some((name.strip_suffix(suffix)?, *unit)));
+    let unit = UNITS.iter().find_map(|(_, suffix, unit)| Some((name.strip_suffix(suffix)?, *unit)));
     match unit {
-        _ if of_time(name) => Some(1.0),
-        Some((name, unit)) if of_time(name) => Some(unit),
+        _ if of_time(name) => Some(None),
+        Some((name, unit)) if of_time(name) => Some(Some(unit)),
         _ => None,
     }
 }

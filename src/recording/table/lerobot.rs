@@ -1,6 +1,7 @@
 //! What a LeRobot dataset says beside its numbers: names of joints, sizes of images.
 use crate::Error;
-use crate::recording::{RecordedCamera, natural_order};
+use crate::recording::RecordedCamera;
+use crate::recording::names::{natural_order, tidy};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -65,10 +66,6 @@ fn size(feature: &Value) -> Option<[u32; 2]> {
         feature["shape"][index].as_u64().and_then(|side| u32::try_from(side).ok()).filter(|side| *side > 0)
     };
     Some([side("width", 1)?, side("height", 0)?])
-}
-
-fn tidy(name: &str) -> String {
-    name.replace(|c: char| c == '.' || c == '*' || c.is_control(), "_")
 }
 
 /// The data files of a dataset, in the order of their names.

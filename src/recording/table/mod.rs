@@ -11,33 +11,30 @@
 //! | `CAMERA.FEATURE.x` `.y` `.z` | point in the camera's frame |
 //! | `CAMERA.TARGET.x` … `.qw` | pose of a target in the camera's frame |
 //!
-//! LeRobot's `observation.state` are joints, by the names in `meta/info.json`; `action` are targets of joints. What is empty, null or not a
-//! number was not measured.
+//! Times without a unit are seconds, or what makes them dates of this century, which is said. LeRobot's `observation.state` are joints, by the names
+//! in `meta/info.json`; `action.NAME` are targets or motions of the joints of the same names, which the options say; where the numbers of `action`
+//! have no names, they are of the joints in their order. Its images and whatever else begins with `observation.` or `next.` are passed over. What is
+//! empty, null or not a number was not measured.
 mod columns;
 mod csv;
+mod dataset;
 mod lerobot;
 mod parquet;
 mod samples;
 
-use super::{RecordedCamera, Recording};
+use super::{OpenOptions, Opened};
 use crate::Error;
 use std::path::Path;
 
 /// What of a table is meant, where its columns alone do not tell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TableOptions {
-    /// Names of the joints from base to tip, some of those in the table; empty: `known_joints`, or all in the order of their columns.
-    pub joints: Vec<String>,
-    /// Names that the joints have where the table has all of them, as those of a rig.
-    pub known_joints: Vec<String>,
     /// The unit of joints whose column does not say it.
     pub angles: Angles,
     /// What `action.NAME`, LeRobot's `action`, holds.
     pub actions: Actions,
     /// Episodes to read (`episode_index`); empty: all.
     pub episodes: Vec<u64>,
-    /// What is known of the cameras, by name.
-    pub cameras: Vec<RecordedCamera>,
 }
 
 /// The unit of joints.
@@ -64,50 +61,28 @@ pub enum Actions {
     Motions,
 }
 
-/// A table as a recording, and what has to be said of it.
-#[derive(Clone, Debug)]
-pub struct Table {
-    /// One sample for each row.
-    pub recording: Recording,
-    /// For each row the name of the image that it goes with, without folder and ending, where a CSV file has a column `image`; otherwise empty.
-    pub images: Vec<String>,
-    /// What was left out and what was taken for granted: one line each.
-    pub notes: Vec<String>,
+/// Reads a CSV file: values apart by `,`, `;` or tab, a header in the first line, comments in lines that begin with `#`.
+///
+/// Errors: [`Error::Io`], and [`Error::Malformed`] with the place of what cannot be read.
+pub(super) fn read_csv(path: &Path, options: &OpenOptions) -> Result<Opened, Error> {
+    samples::read(csv::Csv::open(path)?, options, &[])
 }
 
-impl Table {
-    /// Reads a CSV file: values apart by `,`, `;` or tab, a header in the first line, comments in lines that begin with `#`.
-    ///
-    /// Errors: [`Error::Io`], and [`Error::Malformed`] with the place of what cannot be read.
-    pub fn read_csv(path: &Path, options: &TableOptions) -> Result<Table, Error> {
-        samples::read(csv::Csv::open(path)?, options, &[])
-    }
+/// Reads a Parquet file of numbers, or of a LeRobot dataset, whose `meta/info.json` is looked for beside and above it.
+///
+/// Errors: [`Error::Io`], and [`Error::Unusable`] with row and column.
+pub(super) fn read_parquet(path: &Path, options: &OpenOptions) -> Result<Opened, Error> {
+    let info = lerobot::Info::find(path)?;
+    samples::read(parquet::Parquet::open(path, &info)?, options, &info.cameras)
+}
 
-    /// Reads a Parquet file of numbers, or of a LeRobot dataset, whose `meta/info.json` is looked for beside and above it.
-    ///
-    /// Errors: [`Error::Io`], and [`Error::Unusable`] with row and column.
-    pub fn read_parquet(path: &Path, options: &TableOptions) -> Result<Table, Error> {
-        let info = lerobot::Info::find(path)?;
-        samples::read(parquet::Parquet::open(path, &info)?, options, &info.cameras)
-    }
-
-    /// Reads all of a LeRobot dataset: the Parquet files in the folder `data` beside `meta/info.json`, in the order of their names.
-    ///
-    /// Errors: those of [`Table::read_parquet`], and [`Error::Unusable`] for a folder that is no dataset.
-    pub fn read_lerobot(folder: &Path, options: &TableOptions) -> Result<Table, Error> {
-        let files = lerobot::files(folder)?;
-        let mut notes = Vec::new();
-        let recording = Recording::read_all_with(&files, &mut |file| {
-            let table = Table::read_parquet(file, options)?;
-            for note in table.notes {
-                if !notes.contains(&note) {
-                    notes.push(note);
-                }
-            }
-            Ok(table.recording)
-        })?;
-        Ok(Table { recording, images: Vec::new(), notes })
-    }
+/// Reads all of a LeRobot dataset: the Parquet files in the folder `data` beside `meta/info.json`, in the order of their names.
+///
+/// Errors: those of [`read_parquet`], and [`Error::Unusable`] for a folder that is no dataset.
+pub(super) fn read_lerobot(folder: &Path, options: &OpenOptions) -> Result<Opened, Error> {
+    let files = lerobot::files(folder)?;
+    let info = lerobot::Info::find(&files[0])?;
+    samples::read(dataset::Dataset::open(folder, files, &info)?, options, &info.cameras)
 }
 
 /// A table that is read row by row.
@@ -121,6 +96,21 @@ trait Rows {
     /// The name of the image that belongs to the row that was read last, without folder and ending, where there is such a column.
     fn image(&self) -> Option<&str> {
         None
+    }
+
+    /// True where the numbers in a column are seconds, whatever its name says.
+    fn is_in_seconds(&self, _column: usize) -> bool {
+        false
+    }
+
+    /// What there is beside columns of numbers.
+    fn left_out(&self) -> &[String] {
+        &[]
+    }
+
+    /// What has to be said of the names of its columns.
+    fn notes(&self) -> &[String] {
+        &[]
     }
 
     /// A problem with a column of the row that was read last, or of the header before any.

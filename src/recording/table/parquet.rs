@@ -2,6 +2,7 @@
 use super::Rows;
 use super::lerobot::Info;
 use crate::Error;
+use parquet::basic::{LogicalType, TimeUnit};
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::reader::RowIter;
@@ -14,45 +15,81 @@ use std::path::{Path, PathBuf};
 pub(super) struct Parquet {
     path: PathBuf,
     header: Vec<String>,
-    /// For each column the field that it is of, and which number of it where that is a list.
-    places: Vec<(usize, Option<usize>)>,
+    /// Where the number of each column stands.
+    places: Vec<Place>,
     fields: Vec<TypePtr>,
+    /// Fields that are no numbers.
+    left_out: Vec<String>,
+    notes: Vec<String>,
     /// Rows of the fields that are wanted, whose indices stand beside; `None` before the first.
     rows: Option<(RowIter<'static>, Vec<usize>)>,
     /// Number of the row that was read last, from 1; 0 before any.
     row: usize,
 }
 
-/// LeRobot's lists, and what their numbers are called here.
-const LISTS: [(&str, &str); 2] = [("observation.state", "joints"), ("action", "action")];
+#[derive(Clone, Copy)]
+struct Place {
+    field: usize,
+    /// Which number of the field, where that is a list.
+    number: Option<usize>,
+    /// The seconds that one unit of a time takes, by the field's type.
+    seconds: Option<f64>,
+}
+
+/// LeRobot's lists of numbers, which are numbers alone where there is one.
+const STATE: &str = "observation.state";
+const ACTION: &str = "action";
 
 impl Parquet {
     pub(super) fn open(path: &Path, info: &Info) -> Result<Parquet, Error> {
         let reader = reader(path)?;
         let fields = reader.metadata().file_metadata().schema_descr().root_schema().get_fields().to_vec();
-        let mut parquet =
-            Parquet { path: path.to_owned(), header: Vec::new(), places: Vec::new(), fields, rows: None, row: 0 };
-        for (index, field) in parquet.fields.iter().enumerate() {
-            let known = LISTS.iter().find(|(name, _)| *name == field.name() && !field.is_primitive());
-            let Some((name, prefix)) = known else {
-                parquet.header.push(field.name().to_owned());
-                parquet.places.push((index, None));
-                continue;
-            };
-            let named = if *prefix == "joints" { &info.state } else { &info.action };
-            let length = first_length(path, field)?.unwrap_or(named.len());
-            if length != named.len() && !named.is_empty() {
-                return Err(Error::Unusable(format!(
-                    "{}: `{name}` has {length} numbers, and meta/info.json names {}: {}",
-                    path.display(),
-                    named.len(),
-                    named.join(", ")
-                )));
+        let (header, places, left_out, notes, rows, row) = Default::default();
+        let mut parquet = Parquet { path: path.to_owned(), header, places, fields, left_out, notes, rows, row };
+        let length = |name: &str, named: &[String]| -> Result<usize, Error> {
+            match parquet.fields.iter().find(|field| field.name() == name) {
+                None => Ok(0),
+                Some(field) if field.is_primitive() => Ok(1),
+                Some(field) => Ok(first_length(path, field)?.unwrap_or(named.len())),
             }
-            for number in 0..length {
-                let joint = named.get(number).cloned().unwrap_or_else(|| format!("j{}", number + 1));
+        };
+        let lengths = [length(STATE, &info.state)?, length(ACTION, &info.action)?];
+        let mut note = |list: &str, length: usize, named: &[String]| {
+            if length > 0 && !named.is_empty() && length != named.len() {
+                let names = named.join(", ");
+                let problem = format!("which meta/info.json names {}: {names}", named.len());
+                parquet
+                    .notes
+                    .push(format!("`{list}` has {length} numbers, {problem}; they are called j1 to j{length}"));
+            }
+        };
+        note(STATE, lengths[0], &info.state);
+        note(ACTION, lengths[1], &info.action);
+        let fitting = |named: &[String], length: usize| {
+            let plain = || (1..=length).map(|number| format!("j{number}")).collect();
+            if named.len() == length { named.to_vec() } else { plain() }
+        };
+        let state = fitting(&info.state, lengths[0]);
+        // Targets without names of their own are of the joints in their order.
+        let action = fitting(if info.action.is_empty() { &state } else { &info.action }, lengths[1]);
+        for (index, field) in parquet.fields.iter().enumerate() {
+            let (prefix, names) = match field.name() {
+                STATE => ("joints", &state),
+                ACTION => ("action", &action),
+                name if field.is_primitive() => {
+                    parquet.header.push(name.to_owned());
+                    parquet.places.push(Place { field: index, number: None, seconds: seconds(field) });
+                    continue;
+                }
+                name => {
+                    parquet.left_out.push(name.to_owned());
+                    continue;
+                }
+            };
+            for (number, joint) in names.iter().enumerate() {
                 parquet.header.push(format!("{prefix}.{joint}"));
-                parquet.places.push((index, Some(number)));
+                let number = (!field.is_primitive()).then_some(number);
+                parquet.places.push(Place { field: index, number, seconds: None });
             }
         }
         Ok(parquet)
@@ -65,7 +102,7 @@ impl Parquet {
     /// Begins to read the fields that are wanted.
     fn begin(&self, wanted: &[bool]) -> Result<(RowIter<'static>, Vec<usize>), Error> {
         let columns = self.places.iter().zip(wanted).filter(|(_, wanted)| **wanted);
-        let mut fields: Vec<usize> = columns.map(|((field, _), _)| *field).collect();
+        let mut fields: Vec<usize> = columns.map(|(place, _)| place.field).collect();
         fields.dedup();
         // A projection of nothing is everything.
         let of = if fields.is_empty() { (0..self.fields.len().min(1)).collect() } else { fields };
@@ -75,9 +112,10 @@ impl Parquet {
 
     /// The number in a column, NaN where there is none.
     fn number(&self, column: usize, field: &Field) -> Result<f64, Error> {
-        let field = match (field, self.places[column].1) {
+        let place = self.places[column];
+        let field = match (field, place.number) {
             (Field::ListInternal(list), Some(number)) => {
-                let length = self.places.iter().filter(|place| place.0 == self.places[column].0).count();
+                let length = self.places.iter().filter(|other| other.field == place.field).count();
                 let found = list.elements().len();
                 if found != length {
                     return Err(
@@ -94,7 +132,7 @@ impl Parquet {
             Field::Byte(value) => f64::from(value),
             Field::Short(value) => f64::from(value),
             Field::Int(value) => f64::from(value),
-            Field::Long(value) => value as f64,
+            Field::Long(value) => value as f64 * place.seconds.unwrap_or(1.0),
             Field::UByte(value) => f64::from(value),
             Field::UShort(value) => f64::from(value),
             Field::UInt(value) => f64::from(value),
@@ -125,12 +163,26 @@ impl Rows for Parquet {
         let Some(found) = next else { return Ok(false) };
         self.row += 1;
         for ((_, value), field) in found.get_column_iter().zip(&fields) {
-            for column in (0..self.places.len()).filter(|column| self.places[*column].0 == *field && wanted[*column]) {
+            for column in
+                (0..self.places.len()).filter(|column| self.places[*column].field == *field && wanted[*column])
+            {
                 row[column] = self.number(column, value)?;
             }
         }
         self.rows = Some((rows, fields));
         Ok(true)
+    }
+
+    fn is_in_seconds(&self, column: usize) -> bool {
+        self.places[column].seconds.is_some()
+    }
+
+    fn left_out(&self) -> &[String] {
+        &self.left_out
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
     }
 
     fn error(&self, column: usize, problem: String) -> Error {
@@ -173,6 +225,18 @@ fn first_length(path: &Path, field: &TypePtr) -> Result<Option<usize>, Error> {
         _ => 0,
     };
     Ok(first.map(length))
+}
+
+/// The seconds that one unit of a field takes, where its type is a time.
+fn seconds(field: &Type) -> Option<f64> {
+    match field.get_basic_info().logical_type_ref()? {
+        LogicalType::Timestamp(time) => Some(match time.unit {
+            TimeUnit::MILLIS => 1e-3,
+            TimeUnit::MICROS => 1e-6,
+            TimeUnit::NANOS => 1e-9,
+        }),
+        _ => None,
+    }
 }
 
 fn cannot(path: &Path, error: &ParquetError) -> Error {

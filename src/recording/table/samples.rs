@@ -1,32 +1,44 @@
 //! Rows as samples.
-use super::columns::{Angle, Columns, PoseColumns, Turn};
-use super::{Actions, Angles, Rows, Table, TableOptions};
+use super::columns::{Angle, Columns, PoseColumns, Rotation, Time};
+use super::{Actions, Angles, Rows};
 use crate::Error;
 use crate::error::suggestion;
 use crate::geometry::orientation;
-use crate::recording::{Detection, PointDetection, RecordedCamera, Recording, Sample, TargetDetection};
+use crate::recording::clock::{LATEST, unit_of_date};
+use crate::recording::{
+    Detection, OpenOptions, Opened, PointDetection, RecordedCamera, Recording, Sample, TargetDetection,
+};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
+use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
 /// Beyond it no joint reading is believed to be in radians unless that is said: two turns to either side.
 const FARTHEST: f64 = 4.0 * PI;
 
+/// Two rows of a recording are hardly that far apart [s].
+const DAY: f64 = 86_400.0;
+
 /// Reads all rows. `cameras`: what the dataset says of cameras, which the options know better.
-pub(super) fn read(mut rows: impl Rows, options: &TableOptions, cameras: &[RecordedCamera]) -> Result<Table, Error> {
-    let columns = Columns::new(rows.header(), &options.joints, &options.known_joints)
-        .map_err(|(column, problem)| rows.error(column, problem))?;
+pub(super) fn read(mut rows: impl Rows, options: &OpenOptions, cameras: &[RecordedCamera]) -> Result<Opened, Error> {
+    let columns = Columns::new(rows.header(), options).map_err(|(column, problem)| rows.error(column, problem))?;
     if let Some(problem) = without_effect(&columns, options) {
         return Err(Error::Unusable(format!("{}: {problem}", rows.file())));
     }
-    let mut reader = Reader::new(&columns, options);
+    let is_typed = columns.time.is_some_and(|time| rows.is_in_seconds(time.column));
+    let mut reader = Reader::new(&columns, options, is_typed);
     let wanted = columns.wanted(rows.header().len());
     let (mut row, mut images) = (Vec::new(), Vec::new());
     while rows.next(&wanted, &mut row)? {
         let is_taken = reader.take(&row).map_err(|(column, problem)| rows.error(column, problem))?;
         images.extend(rows.image().filter(|_| is_taken).map(str::to_owned));
     }
-    let Reader { mut samples, mut notes, rows: count, incomplete, restarts, .. } = reader;
+    let Reader { samples, mut notes, rows: count, incomplete, restarts, farthest, episodes, unit, .. } = reader;
+    let is_missing = |named: &&u64| !episodes.contains(named);
+    if let Some(missing) = options.table.episodes.iter().find(is_missing) {
+        let file = rows.file();
+        return Err(Error::Unusable(format!("{file}: has no episode {missing}; it has {}", in_words(&episodes))));
+    }
     let has_anything = |sample: &Sample| {
         sample.joints.is_some()
             || sample.pose.is_some()
@@ -35,50 +47,64 @@ pub(super) fn read(mut rows: impl Rows, options: &TableOptions, cameras: &[Recor
             || !(sample.pixels.is_empty() && sample.points.is_empty() && sample.targets.is_empty())
     };
     if !samples.iter().any(has_anything) {
-        return Err(Error::Unusable(nothing(&rows.file(), rows.header(), count, options)));
+        return Err(Error::Unusable(nothing(&rows.file(), rows.header(), count)));
     }
     if incomplete > 0 {
-        notes.push(format!("{incomplete} rows have some joints or parts of a pose and not all, which are left out"));
+        notes.push(format!("{incomplete} rows have some joints and not all, which are left out"));
     }
     if restarts > 0 {
         notes.push(format!("times begin anew {restarts} times, and are counted on from there, one second later"));
     }
-    notes.extend(note_on_columns(&columns, options));
-    let (features, places) = columns.features.in_natural_order();
-    samples.iter_mut().for_each(|sample| sample.renumber(&places));
-    let known = options.cameras.iter().chain(cameras);
+    if farthest > DAY && unit.is_none_or(|unit| unit == 1.0) {
+        notes.push(format!(
+            "rows are up to {farthest} s apart; where times are not in seconds, a column `time_ms`, `time_us` or `time_ns` says so"
+        ));
+    }
+    notes.extend(rows.notes().iter().cloned());
+    notes.extend(note_on_columns(&columns, options, rows.left_out()));
     let camera = |name: &String| {
         let unknown = || RecordedCamera { name: name.clone(), ..RecordedCamera::default() };
-        known.clone().find(|camera| camera.name == *name).cloned().unwrap_or_else(unknown)
+        cameras.iter().find(|camera| camera.name == *name).cloned().unwrap_or_else(unknown)
     };
+    let (joints, features) = (columns.joint_names, columns.features.list);
     let cameras = columns.cameras.iter().map(camera).collect();
-    let recording = Recording { joints: columns.joint_names, cameras, features, samples };
-    Ok(Table { recording, images, notes })
+    let mut recording = Recording { joints, cameras, features, samples };
+    let file = rows.file();
+    let described = recording.describe_cameras(&options.cameras);
+    described.map_err(|problem| Error::Unusable(format!("{file}: {problem}")))?;
+    Ok(Opened { recording: recording.checked_as(&file)?, notes, images })
+}
+
+/// Numbers of episodes, those that follow one another as from and to.
+fn in_words(episodes: &BTreeSet<u64>) -> String {
+    let numbers: Vec<u64> = episodes.iter().copied().collect();
+    let runs = numbers.chunk_by(|a, b| a + 1 == *b);
+    let words: Vec<String> = runs
+        .map(|run| match run {
+            [first, .., last] => format!("{first} to {last}"),
+            _ => run.iter().map(u64::to_string).collect(),
+        })
+        .collect();
+    if words.is_empty() { "none".to_owned() } else { words.join(", ") }
 }
 
 /// What the options name and the table does not have.
-fn without_effect(columns: &Columns, options: &TableOptions) -> Option<String> {
+fn without_effect(columns: &Columns, options: &OpenOptions) -> Option<String> {
     let joints = || columns.joint_names.iter().map(String::as_str);
-    if let Angles::Degrees(named) = &options.angles
+    if let Angles::Degrees(named) = &options.table.angles
         && let Some(name) = named.iter().find(|name| !columns.joint_names.contains(name))
     {
         return Some(format!("there is no joint `{name}` to take for degrees {}", suggestion(name, joints())));
     }
-    let cameras = || columns.cameras.iter().map(String::as_str);
-    if let Some(camera) = options.cameras.iter().find(|camera| !columns.cameras.contains(&camera.name)) {
-        let name = &camera.name;
-        return Some(format!("no column is of a camera `{name}` {}", suggestion(name, cameras())));
-    }
-    (!options.episodes.is_empty() && columns.episode.is_none())
+    (!options.table.episodes.is_empty() && columns.episode.is_none())
         .then(|| "has no column `episode_index`, of which --episodes would name some".to_owned())
 }
 
 /// Why a table is no recording.
-fn nothing(file: &str, header: &[String], rows: usize, options: &TableOptions) -> String {
+fn nothing(file: &str, header: &[String], rows: usize) -> String {
     let columns = header.join(", ");
     match rows {
-        0 if options.episodes.is_empty() => format!("{file}: has no rows, only the columns {columns}"),
-        0 => format!("{file}: has no row of episodes {:?}", options.episodes),
+        0 => format!("{file}: has no rows, only the columns {columns}"),
         _ => format!(
             "{file}: has no joints (`joints.NAME`, or columns that --joints of `handeye convert` names), no pose (`pose.x`) and no features \
              (`CAMERA.FEATURE.u`); it has the columns {columns}"
@@ -86,15 +112,21 @@ fn nothing(file: &str, header: &[String], rows: usize, options: &TableOptions) -
     }
 }
 
-fn note_on_columns(columns: &Columns, options: &TableOptions) -> Vec<String> {
+fn note_on_columns(columns: &Columns, options: &OpenOptions, left_out: &[String]) -> Vec<String> {
     let mut notes = Vec::new();
-    if !columns.others.is_empty() {
-        notes.push(format!("columns that say nothing of a recording are left out: {}", columns.others.join(", ")));
+    let others: Vec<&str> = columns.others.iter().chain(left_out).map(String::as_str).collect();
+    if !others.is_empty() {
+        notes.push(format!("columns that say nothing of a recording are left out: {}", others.join(", ")));
     }
-    if !columns.action.is_empty() && options.actions == Actions::Unsaid {
-        notes.push(
-            "actions are left out; --actions of `handeye convert` says whether they are targets or motions".to_owned(),
-        );
+    if !columns.actions.is_empty() && options.table.actions == Actions::Unsaid {
+        let of = if columns.actions == columns.joint_names {
+            String::new()
+        } else {
+            format!(" (of {})", columns.actions.join(", "))
+        };
+        notes.push(format!(
+            "actions are left out{of}; --actions of `handeye convert` says whether they are targets or motions of the joints"
+        ));
     }
     let is_given = !options.joints.is_empty() || columns.joint_names == options.known_joints;
     if !columns.joints.is_empty() && !is_given {
@@ -105,7 +137,7 @@ fn note_on_columns(columns: &Columns, options: &TableOptions) -> Vec<String> {
         ));
     }
     let unsaid = columns.joints.iter().filter(|joint| !joint.in_degrees).count();
-    if unsaid > 0 && options.angles == Angles::Unsaid {
+    if unsaid > 0 && options.table.angles == Angles::Unsaid {
         notes.push("joints are taken for radians or metres, since no column says `_deg`".to_owned());
     }
     notes
@@ -114,7 +146,7 @@ fn note_on_columns(columns: &Columns, options: &TableOptions) -> Vec<String> {
 /// Samples as they come.
 struct Reader<'a> {
     columns: &'a Columns,
-    options: &'a TableOptions,
+    options: &'a OpenOptions,
     samples: Vec<Sample>,
     notes: Vec<String>,
     /// Rows of the episodes that are read.
@@ -124,16 +156,24 @@ struct Reader<'a> {
     /// Where times began anew: how often, and what is added to them since [s].
     restarts: usize,
     shift: f64,
+    /// The last time, and how far two that follow one another are apart at most [s].
+    last: Option<f64>,
+    farthest: f64,
+    /// The seconds that one unit of the times takes; `None` before the first of those that do not say it.
+    unit: Option<f64>,
     episode: Option<f64>,
+    /// All that there are.
+    episodes: BTreeSet<u64>,
     /// Where each joint stands, and what takes its numbers to radians or metres; `None`: they are that, as far as one can see.
     joints: Vec<(usize, Option<f64>)>,
     joint_action: Vec<(usize, Option<f64>)>,
 }
 
 impl<'a> Reader<'a> {
-    fn new(columns: &'a Columns, options: &'a TableOptions) -> Self {
+    /// `is_typed`: times are seconds, whatever they are called.
+    fn new(columns: &'a Columns, options: &'a OpenOptions, is_typed: bool) -> Self {
         let scale = |(joint, angle): (&String, &Angle)| {
-            let scale = match &options.angles {
+            let scale = match &options.table.angles {
                 _ if angle.in_degrees => Some(PI / 180.0),
                 Angles::Unsaid => None,
                 Angles::Degrees(named) if named.is_empty() || named.contains(joint) => Some(PI / 180.0),
@@ -142,7 +182,7 @@ impl<'a> Reader<'a> {
             (angle.column, scale)
         };
         let scales = |angles: &[Angle]| columns.joint_names.iter().zip(angles).map(scale).collect::<Vec<_>>();
-        let is_used = columns.joint_action.is_empty() && options.actions != Actions::Unsaid;
+        let is_used = columns.joint_action.is_empty() && options.table.actions != Actions::Unsaid;
         let joint_action = scales(if is_used { &columns.action } else { &columns.joint_action });
         Reader {
             columns,
@@ -153,7 +193,11 @@ impl<'a> Reader<'a> {
             incomplete: 0,
             restarts: 0,
             shift: 0.0,
+            last: None,
+            farthest: 0.0,
+            unit: if is_typed { Some(1.0) } else { columns.time.and_then(|time| time.unit) },
             episode: None,
+            episodes: BTreeSet::new(),
             joints: scales(&columns.joints),
             joint_action,
         }
@@ -162,25 +206,28 @@ impl<'a> Reader<'a> {
     /// Takes a row, and says whether it was one of those that are read. Errors: a column, and what is wrong with its number.
     fn take(&mut self, row: &[f64]) -> Result<bool, (usize, String)> {
         let columns = self.columns;
+        let mut is_next = false;
         if let Some(column) = columns.episode {
             let episode = row[column];
+            if episode >= 0.0 {
+                self.episodes.insert(episode as u64);
+            }
             let is_meant = |named: &u64| *named as f64 == episode;
-            if !self.options.episodes.is_empty() && !self.options.episodes.iter().any(is_meant) {
+            if !self.options.table.episodes.is_empty() && !self.options.table.episodes.iter().any(is_meant) {
                 return Ok(false);
             }
-            if self.episode.is_some_and(|last| last != episode)
-                && let Some(last) = self.samples.last_mut()
-            {
+            is_next = self.episode.is_some_and(|last| last != episode);
+            if is_next && let Some(last) = self.samples.last_mut() {
                 // It does not lead to the first row of the next episode.
                 (last.joint_action, last.pose_action) = (None, None);
             }
             self.episode = Some(episode);
         }
         self.rows += 1;
-        let mut sample = Sample { time: self.time(row), ..Sample::default() };
+        let mut sample = Sample { time: self.time(row, is_next)?, ..Sample::default() };
         sample.joints = self.angles(row, &self.joints)?;
         sample.joint_action = self.angles(row, &self.joint_action)?;
-        if self.options.actions == Actions::Targets && columns.joint_action.is_empty() {
+        if self.options.table.actions == Actions::Targets && columns.joint_action.is_empty() {
             let motion =
                 |(target, joints): (Vec<f64>, &Vec<f64>)| target.iter().zip(joints).map(|(a, b)| a - b).collect();
             sample.joint_action = sample.joint_action.zip(sample.joints.as_ref()).map(motion);
@@ -191,10 +238,7 @@ impl<'a> Reader<'a> {
             let missing = angles.iter().filter(|(column, _)| row[*column].is_nan()).count();
             missing > 0 && missing < angles.len()
         };
-        let is_half = |pose: Option<PoseColumns>, read: Option<Pose>| {
-            read.is_none() && pose.is_some_and(|pose| pose.columns().iter().any(|column| !row[*column].is_nan()))
-        };
-        if is_partial(&self.joints) || is_partial(&self.joint_action) || is_half(columns.pose, sample.pose) {
+        if is_partial(&self.joints) || is_partial(&self.joint_action) {
             self.incomplete += 1;
         }
         for &(camera, feature, at) in &columns.pixels {
@@ -217,22 +261,46 @@ impl<'a> Reader<'a> {
         Ok(true)
     }
 
-    /// The time of a row [s], which goes on where times begin anew.
-    fn time(&mut self, row: &[f64]) -> Option<f64> {
-        let (column, unit) = self.columns.time?;
-        let time = row[column] * unit;
-        if time.is_nan() {
-            return None;
+    /// The time of a row [s], which goes on where an episode begins anew.
+    fn time(&mut self, row: &[f64], is_next: bool) -> Result<Option<f64>, (usize, String)> {
+        let Some(Time { column, .. }) = self.columns.time else { return Ok(None) };
+        let number = row[column];
+        if number.is_nan() {
+            return Ok(None);
         }
-        let last = self.samples.iter().rev().find_map(|sample| sample.time);
-        if self.columns.episode.is_some()
-            && let Some(last) = last
-            && time + self.shift < last
-        {
-            self.restarts += 1;
-            self.shift = last + 1.0 - time;
+        let mut seconds = number * self.unit.unwrap_or(1.0);
+        if self.unit.is_none() {
+            let (name, unit) = unit_of_date(number).unwrap_or(("seconds", 1.0));
+            if unit != 1.0 {
+                self.notes.push(format!("times are taken for {name} since 1970: {number} would be no date in seconds"));
+            }
+            self.unit = Some(unit);
+            seconds = number * unit;
         }
-        Some(time + self.shift)
+        if seconds.abs() > LATEST {
+            let would_do = "a column `time_ms`, `time_us` or `time_ns` says another unit";
+            return Err((column, format!("{seconds} s is no time, since 1970 or of a clock; {would_do}")));
+        }
+        let mut time = seconds + self.shift;
+        if let Some(last) = self.last {
+            if time < last && !is_next {
+                let before = last - self.shift;
+                return Err((
+                    column,
+                    format!(
+                        "time goes back, from {before} s to {seconds} s; where that is another episode, a column `episode_index` says so"
+                    ),
+                ));
+            }
+            if time < last {
+                self.restarts += 1;
+                self.shift = last + 1.0 - seconds;
+                time = last + 1.0;
+            }
+            self.farthest = self.farthest.max(time - last);
+        }
+        self.last = Some(time);
+        Ok(Some(time))
     }
 
     /// Numbers of all joints; `None` where one is missing.
@@ -257,24 +325,28 @@ impl<'a> Reader<'a> {
 
 /// Numbers that were measured together; `None` where none of them was.
 fn whole<const N: usize>(row: &[f64], columns: [usize; N]) -> Result<Option<[f64; N]>, (usize, String)> {
-    let numbers = columns.map(|column| row[column]);
+    Ok(is_there(row, &columns)?.then(|| columns.map(|column| row[column])))
+}
+
+/// True where all of these were measured, false where none was. Errors: the first that is missing.
+fn is_there(row: &[f64], columns: &[usize]) -> Result<bool, (usize, String)> {
     match columns.iter().find(|column| row[**column].is_nan()) {
-        None => Ok(Some(numbers)),
-        Some(_) if numbers.iter().all(|number| number.is_nan()) => Ok(None),
+        None => Ok(true),
+        Some(_) if columns.iter().all(|column| row[*column].is_nan()) => Ok(false),
         Some(&missing) => Err((missing, "this is empty, and what belongs to it is not".to_owned())),
     }
 }
 
 impl PoseColumns {
-    /// The pose in a row; `None` where a part of it is missing.
+    /// The pose in a row; `None` where it was not measured.
     fn read(&self, row: &[f64]) -> Result<Option<Pose>, (usize, String)> {
-        if self.columns().iter().any(|column| row[*column].is_nan()) {
+        if !is_there(row, &self.columns())? {
             return Ok(None);
         }
-        let rotation = match self.turn {
-            Turn::Quaternion(columns) => orientation::from_quaternion(columns.map(|column| row[column]))
+        let rotation = match self.rotation {
+            Rotation::Quaternion(columns) => orientation::from_quaternion(columns.map(|column| row[column]))
                 .ok_or_else(|| (columns[0], "a quaternion of length 0 is no rotation".to_owned()))?,
-            Turn::RollPitchYaw(angles) => orientation::from_rpy(
+            Rotation::RollPitchYaw(angles) => orientation::from_rpy(
                 angles.map(|angle| row[angle.column] * if angle.in_degrees { PI / 180.0 } else { 1.0 }),
             ),
         };

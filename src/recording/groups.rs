@@ -1,8 +1,20 @@
 //! Images of several cameras at the same time as one sample.
-use super::images::Image;
+use super::names::Names;
+use super::{Detection, Sample};
+use handeye_solvers::Pose;
+
+/// What one image shows.
+pub(super) struct Image {
+    /// [ns]
+    pub stamp: i64,
+    /// Index of its source.
+    pub source: usize,
+    /// By index, with the pixel.
+    pub features: Vec<(u32, [f64; 2])>,
+}
 
 /// Images that make a sample.
-pub(in crate::recording) struct Group {
+pub(super) struct Group {
     /// The mean of their stamps [ns].
     pub time: i64,
     /// Indices, ordered by stamp.
@@ -14,7 +26,7 @@ pub(in crate::recording) struct Group {
 /// Groups images whose stamps are `within` [ns] of the first of them, each of another camera or of exactly its stamp.
 ///
 /// `within`: half the shortest usual time between two images of one camera where it is not given.
-pub(in crate::recording) fn groups(images: &[Image], camera: &[u32], within: Option<i64>) -> Vec<Group> {
+pub(super) fn groups(images: &[Image], camera: &[u32], within: Option<i64>) -> Vec<Group> {
     let mut order: Vec<usize> = (0..images.len()).filter(|&index| !images[index].features.is_empty()).collect();
     order.sort_by_key(|&index| images[index].stamp);
     let within = within.unwrap_or_else(|| usual_period(images, camera, &order) / 2);
@@ -55,4 +67,31 @@ fn usual_period(images: &[Image], camera: &[u32], order: &[usize]) -> i64 {
         periods.get(periods.len().checked_sub(1)? / 2).copied()
     };
     (0..n_cameras).filter_map(period).min().unwrap_or(0)
+}
+
+/// The samples, the features that they count by, and how many detections of a feature that its image had already were left out.
+/// `states`: joints and tip pose of each group. Images give their memory back as their samples are made.
+pub(super) fn samples(
+    groups: &[Group],
+    mut images: Vec<Image>,
+    features: Names,
+    camera_of_source: &[u32],
+    states: impl Iterator<Item = (Option<Vec<f64>>, Option<Pose>)>,
+) -> (Vec<Sample>, Vec<String>, usize) {
+    let mut twice = 0;
+    let mut sample = |(group, (joints, pose)): (&Group, (Option<Vec<f64>>, Option<Pose>))| {
+        let number = group.images.iter().map(|&index| images[index].features.len()).sum();
+        let mut pixels: Vec<Detection> = Vec::with_capacity(number);
+        for &index in &group.images {
+            let camera = camera_of_source[images[index].source];
+            let features = std::mem::take(&mut images[index].features);
+            pixels.extend(features.into_iter().map(|(feature, pixel)| Detection { camera, feature, pixel }));
+        }
+        pixels.sort_by_key(|detection| (detection.camera, detection.feature));
+        pixels.dedup_by_key(|detection| (detection.camera, detection.feature));
+        twice += number - pixels.len();
+        Sample { time: Some(group.time as f64 / 1e9), joints, pose, pixels, ..Sample::default() }
+    };
+    let samples = groups.iter().zip(states).map(&mut sample).collect();
+    (samples, features.list, twice)
 }

@@ -1,0 +1,168 @@
+//! What of bags and tables is meant, for the commands that are told.
+use super::inputs::read_camera;
+use clap::{Args, ValueEnum};
+use handeye::Error;
+use handeye::recording::{Actions, Angles, BagOptions, Format, OpenOptions, TableOptions};
+use std::path::Path;
+
+#[derive(Args)]
+pub struct Reading {
+    /// Names of the joints from base to tip [default: those of the first joint state, or of the columns]
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    joints: Vec<String>,
+    /// What is known of a camera: the size of its images, or a calibration file (ROS, OpenCV, Kalibr), whose lens replaces any other
+    #[arg(long, value_name = "NAME=WIDTHxHEIGHT|FILE")]
+    camera: Vec<String>,
+    #[command(flatten)]
+    bag: OfBags,
+    #[command(flatten)]
+    table: OfTables,
+}
+
+impl Reading {
+    /// Refuses options that are nothing to any of the files that are read.
+    pub fn refuse_without_effect(&self, files: &[&Path]) -> Result<(), Error> {
+        let formats: Vec<Format> = files.iter().map(|file| Format::of(file)).collect();
+        let has_bag = formats.contains(&Format::Bag);
+        let has_table = formats.iter().any(|format| matches!(format, Format::Csv | Format::Parquet | Format::LeRobot));
+        let joints = (!self.joints.is_empty()).then_some("--joints");
+        let without_effect = self.bag.given().filter(|_| !has_bag).or(self.table.given().filter(|_| !has_table));
+        let Some(option) = without_effect.or(joints.filter(|_| !has_bag && !has_table)) else { return Ok(()) };
+        let kind = |format: &Format| match format {
+            Format::JsonLines => "a recording",
+            Format::Bag => "a bag",
+            Format::Csv | Format::Parquet | Format::LeRobot => "a table",
+        };
+        let kinds = files.iter().zip(&formats).map(|(file, format)| format!("{} is {}", file.display(), kind(format)));
+        let kinds = kinds.collect::<Vec<_>>().join(", ");
+        let nothing = if kinds.is_empty() { "no bag and no table is read".to_owned() } else { kinds };
+        Err(Error::Unusable(format!("{nothing}, where {option} has no effect")))
+    }
+
+    pub fn options(&self) -> Result<OpenOptions, Error> {
+        Ok(OpenOptions {
+            joints: self.joints.clone(),
+            known_joints: Vec::new(),
+            cameras: self.camera.iter().map(|text| read_camera(text)).collect::<Result<_, _>>()?,
+            bag: self.bag.options(),
+            table: self.table.options(),
+        })
+    }
+}
+
+#[derive(Args)]
+#[command(next_help_heading = "Options of bags")]
+pub struct OfBags {
+    /// The topic of joint states, where there are several
+    #[arg(long, value_name = "TOPIC")]
+    joint_topic: Option<String>,
+    /// The topic of tip poses (PoseStamped)
+    #[arg(long, value_name = "TOPIC")]
+    pose_topic: Option<String>,
+    /// The frame of the base, for tip poses from TF
+    #[arg(long, value_name = "FRAME", requires = "tip_frame")]
+    base_frame: Option<String>,
+    /// The frame of the tip, for tip poses from TF
+    #[arg(long, value_name = "FRAME", requires = "base_frame")]
+    tip_frame: Option<String>,
+    /// Topics of detections, with the camera's name where it is not that of the frame [default: all]
+    #[arg(long, value_name = "TOPIC[=CAMERA],...", value_delimiter = ',')]
+    camera_topic: Vec<String>,
+    /// Images at most this far apart make one sample [s] [default: half the time between two images]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    join: Option<f64>,
+}
+
+#[derive(Args)]
+#[command(next_help_heading = "Options of tables")]
+pub struct OfTables {
+    /// Take joints for degrees: these, or all
+    #[arg(
+        long,
+        value_name = "NAME,...",
+        value_delimiter = ',',
+        num_args = 0..,
+        require_equals = true,
+        conflicts_with = "radians"
+    )]
+    degrees: Option<Vec<String>>,
+    /// Take joints for radians (or metres) even beyond two turns
+    #[arg(long)]
+    radians: bool,
+    /// What `action` holds: positions of the joints to go to, or motions [default: it is left out]
+    #[arg(long, value_name = "WHAT")]
+    actions: Option<What>,
+    /// The episodes to read [default: all]
+    #[arg(long, value_name = "NUMBER,...", value_delimiter = ',')]
+    episodes: Vec<u64>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum What {
+    Targets,
+    Motions,
+}
+
+impl OfBags {
+    /// The first option that is given.
+    fn given(&self) -> Option<&'static str> {
+        let options = [
+            (self.joint_topic.is_some(), "--joint-topic"),
+            (self.pose_topic.is_some(), "--pose-topic"),
+            (self.base_frame.is_some(), "--base-frame"),
+            (!self.camera_topic.is_empty(), "--camera-topic"),
+            (self.join.is_some(), "--join"),
+        ];
+        options.into_iter().find(|(is_given, _)| *is_given).map(|(_, name)| name)
+    }
+
+    fn options(&self) -> BagOptions {
+        let camera = |text: &String| match text.split_once('=') {
+            Some((topic, name)) => (topic.to_owned(), Some(name.to_owned())),
+            None => (text.clone(), None),
+        };
+        BagOptions {
+            joint_topic: self.joint_topic.clone(),
+            pose_topic: self.pose_topic.clone(),
+            frames: self.base_frame.clone().zip(self.tip_frame.clone()).map(|(base, tip)| [base, tip]),
+            camera_topics: self.camera_topic.iter().map(camera).collect(),
+            join: self.join,
+        }
+    }
+}
+
+impl OfTables {
+    /// The first option that is given.
+    fn given(&self) -> Option<&'static str> {
+        let options = [
+            (self.degrees.is_some(), "--degrees"),
+            (self.radians, "--radians"),
+            (self.actions.is_some(), "--actions"),
+            (!self.episodes.is_empty(), "--episodes"),
+        ];
+        options.into_iter().find(|(is_given, _)| *is_given).map(|(_, name)| name)
+    }
+
+    fn options(&self) -> TableOptions {
+        TableOptions {
+            angles: match &self.degrees {
+                Some(named) => Angles::Degrees(named.clone()),
+                None if self.radians => Angles::Radians,
+                None => Angles::Unsaid,
+            },
+            actions: match self.actions {
+                None => Actions::Unsaid,
+                Some(What::Targets) => Actions::Targets,
+                Some(What::Motions) => Actions::Motions,
+            },
+            episodes: self.episodes.clone(),
+        }
+    }
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(seconds) if (0.0..f64::INFINITY).contains(&seconds) => Ok(seconds),
+        _ => Err("must be a number of seconds, 0 or more".to_owned()),
+    }
+}
