@@ -199,8 +199,11 @@ class Recording:
         frames: tuple[str, str] | None = None,
         camera_topics: dict[str, str | None] | None = None,
         join: float | None = None,
-        degrees: bool = False,
+        degrees: bool | Sequence[str] | None = None,
+        radians: bool = False,
+        actions: Literal["targets", "motions"] | None = None,
         episodes: Sequence[int] | None = None,
+        cameras: Mapping[str, _Camera | _Path] | None = None,
     ) -> Recording: ...
     @staticmethod
     def from_string(text: str, file_name: str = "recording.jsonl") -> Recording: ...
@@ -218,7 +221,7 @@ class Recording:
         pose_actions: ArrayLike | None = None,
         joint_names: Sequence[str] | None = None,
         feature_names: Sequence[str] | None = None,
-        cameras: Mapping[str, _Camera] | None = None,
+        cameras: Mapping[str, _Camera | _Path] | None = None,
         rig: Rig | None = None,
     ) -> Recording: ...
     def save(self, path: _Path) -> None: ...

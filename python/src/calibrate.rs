@@ -5,7 +5,7 @@ use crate::recording::Recording;
 use crate::rig::Rig;
 use crate::work;
 use handeye::calibrate::{self as library, DeterminedBy, NoiseTrial, Options, Report};
-use handeye::report::{Subject, html};
+use handeye::report::{Subject, html, suggestion};
 use handeye::rig;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -220,15 +220,18 @@ impl Calibration {
     /// The same page as text.
     #[pyo3(signature = (title = None))]
     fn html(&self, py: Python<'_>, title: Option<&str>) -> PyResult<String> {
-        let subject = Subject {
-            title: title.unwrap_or("A learned rig"),
-            before: &self.before,
-            calibration: &self.inner,
-            recording: &self.recording,
-            tables: &[],
-            suggestion: None,
+        let page = || {
+            let suggestion = suggestion(&self.inner.rig, &self.recording, &self.before);
+            html(&Subject {
+                title: title.unwrap_or("A learned rig"),
+                before: &self.before,
+                calibration: &self.inner,
+                recording: &self.recording,
+                tables: &[],
+                suggestion: suggestion.as_ref(),
+            })
         };
-        py.detach(|| html(&subject)).map_err(raise)
+        py.detach(page).map_err(raise)
     }
 
     fn __repr__(&self) -> String {

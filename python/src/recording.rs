@@ -1,9 +1,9 @@
 //! The class `Recording`: files and bags in, numpy arrays out.
 use crate::arrays::{Floats, NewArray, array, rows};
 use crate::errors::{raise, unusable};
-use crate::recording_arrays::Arrays;
+use crate::recording_arrays::{Arrays, read_camera};
 use crate::rig::Rig;
-use handeye::recording::{self, Angles, BagOptions, OpenOptions, RecordedCamera, TableOptions};
+use handeye::recording::{self, Actions, Angles, BagOptions, Format, OpenOptions, RecordedCamera, TableOptions};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PySlice};
@@ -42,20 +42,38 @@ pub enum Paths {
     Several(Vec<PathBuf>),
 }
 
+/// Whether all joints are in degrees, or which.
+#[derive(FromPyObject, PartialEq)]
+enum Degrees {
+    All(bool),
+    Some(Vec<String>),
+}
+
+fn refuse_without_effect(options: &[(&str, bool)], kind: &str, is_read: bool) -> PyResult<()> {
+    match options.iter().find(|(_, is_given)| *is_given && !is_read) {
+        Some((name, _)) => Err(unusable(format!("{name}: none of the recordings is {kind}, so that it has no effect"))),
+        None => Ok(()),
+    }
+}
+
 #[pymethods]
 impl Recording {
     /// Reads recordings: ROS 2 bags (``.mcap``), tables (``.csv``, ``.tsv``, ``.parquet``), LeRobot datasets (a folder), and JSON Lines;
     /// several of one robot are joined in their order.
     ///
-    /// rig: its joints give names and order; joints: names from base to tip. For tables: ``degrees``, where joints are in degrees without
-    /// saying so; ``episodes``, those to read. For bags: ``joint_topic`` and ``pose_topic``, where there are several; ``frames``, (base, tip) for tip poses from TF; ``camera_topics``, topic -> name of the camera or ``None`` (that
-    /// of its frame); ``join`` [s], by how much images of one sample may differ. What has to be said of a file (states that were
-    /// interpolated, samples left out) is in ``notes``, and comes as a warning.
+    /// rig: its joints give names and order; joints: names from base to tip, in bags and tables. cameras: name -> calibration file (YAML of ROS,
+    /// OpenCV or Kalibr), or what is known as in ``from_arrays``; a lens replaces that of the file.
     ///
-    /// Raises ``UnusableInput`` with file, line and column for whatever is wrong inside.
+    /// For bags: ``joint_topic`` and ``pose_topic``, where there are several; ``frames``, (base, tip) for tip poses from TF;
+    /// ``camera_topics``, topic -> name of the camera or ``None`` (that of its frame); ``join`` [s], by how much images of one sample may
+    /// differ. For tables: ``degrees``, true or names, where joints are in degrees without saying so; ``radians``, where they are not even
+    /// beyond two turns; ``actions``, whether LeRobot's are ``"targets"`` or ``"motions"`` (left out otherwise); ``episodes``, those to read.
+    ///
+    /// What has to be said of a file (states that were interpolated, samples left out) is in ``notes``, and comes as a warning. Raises
+    /// ``UnusableInput`` with file, line and column for whatever is wrong inside, and for options without effect.
     #[staticmethod]
     #[pyo3(signature = (paths, *, rig = None, joint_topic = None, joints = None, pose_topic = None, frames = None, camera_topics = None, join = None,
-        degrees = false, episodes = None))]
+        degrees = None, radians = false, actions = None, episodes = None, cameras = None))]
     #[expect(clippy::too_many_arguments, reason = "one keyword per option")]
     fn load(
         py: Python<'_>,
@@ -67,15 +85,61 @@ impl Recording {
         frames: Option<[String; 2]>,
         camera_topics: Option<BTreeMap<String, Option<String>>>,
         join: Option<f64>,
-        degrees: bool,
+        degrees: Option<Degrees>,
+        radians: bool,
+        actions: Option<&str>,
         episodes: Option<Vec<u64>>,
+        cameras: Option<Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
+        let paths = match paths {
+            Paths::One(path) => vec![path],
+            Paths::Several(paths) => paths,
+        };
+        let degrees = degrees.unwrap_or(Degrees::All(false));
+        let in_degrees = degrees != Degrees::All(false);
+        let formats: Vec<Format> = paths.iter().map(|path| Format::of(path)).collect();
+        let of_bags = [
+            ("joint_topic", joint_topic.is_some()),
+            ("pose_topic", pose_topic.is_some()),
+            ("frames", frames.is_some()),
+            ("camera_topics", camera_topics.is_some()),
+            ("join", join.is_some()),
+        ];
+        let of_tables = [
+            ("degrees", in_degrees),
+            ("radians", radians),
+            ("actions", actions.is_some()),
+            ("episodes", episodes.is_some()),
+        ];
+        let is_bag = |format: &Format| *format == Format::Bag;
+        let is_table = |format: &Format| !matches!(format, Format::Bag | Format::JsonLines);
+        refuse_without_effect(&of_bags, "a bag", formats.iter().any(is_bag))?;
+        refuse_without_effect(&of_tables, "a table", formats.iter().any(is_table))?;
+        if in_degrees && radians {
+            return Err(unusable("degrees and radians: joints are in one of them"));
+        }
+        let angles = match degrees {
+            Degrees::Some(names) => Angles::Degrees(names),
+            Degrees::All(true) => Angles::Degrees(Vec::new()),
+            Degrees::All(false) if radians => Angles::Radians,
+            Degrees::All(false) => Angles::Unsaid,
+        };
+        let actions = match actions {
+            None => Actions::Unsaid,
+            Some("targets") => Actions::Targets,
+            Some("motions") => Actions::Motions,
+            Some(other) => return Err(unusable(format!("actions: `{other}` is neither targets nor motions"))),
+        };
         let names = |rig: &Rig| rig.inner.robot.joints.iter().map(|joint| joint.name.clone()).collect::<Vec<String>>();
         let known = rig.map(names);
         let options = OpenOptions {
             joints: joints.unwrap_or_default(),
             known_joints: known.unwrap_or_default(),
-            cameras: Vec::new(),
+            cameras: cameras
+                .iter()
+                .flatten()
+                .map(|(name, known)| read_camera(&name, &known))
+                .collect::<PyResult<_>>()?,
             bag: BagOptions {
                 joint_topic,
                 pose_topic,
@@ -83,15 +147,7 @@ impl Recording {
                 camera_topics: camera_topics.into_iter().flatten().collect(),
                 join,
             },
-            table: TableOptions {
-                angles: if degrees { Angles::Degrees(Vec::new()) } else { Angles::default() },
-                episodes: episodes.unwrap_or_default(),
-                ..TableOptions::default()
-            },
-        };
-        let paths = match paths {
-            Paths::One(path) => vec![path],
-            Paths::Several(paths) => paths,
+            table: TableOptions { angles, actions, episodes: episodes.unwrap_or_default() },
         };
         let mut notes = Vec::new();
         let read = py.detach(|| {
@@ -125,7 +181,8 @@ impl Recording {
     /// translation [m], then rotation vector [rad], along the camera's axes.
     ///
     /// Names: joint_names (j1, j2, ... where left out), feature_names (f0, f1, ...); cameras: name -> {"size": (w, h), "model": "pinhole",
-    /// "fx": ..., "fy": ..., "cx": ..., "cy": ..., "distortion": [...]}, as far as known. With ``rig``, its names and lenses.
+    /// "fx": ..., "fy": ..., "cx": ..., "cy": ..., "distortion": [...]}, as far as known, or a calibration file. With ``rig``, its names and
+    /// lenses.
     ///
     /// Raises ``UnusableInput`` where shapes or names do not fit together.
     #[staticmethod]

@@ -1,6 +1,6 @@
 //! A recording out of arrays.
 use crate::arrays::{Floats, fixed, pose_or_none};
-use crate::errors::unusable;
+use crate::errors::{raise, unusable};
 use handeye::camera::CameraModel;
 use handeye::recording::{Detection, PointDetection, RecordedCamera, Recording, Sample, TargetDetection};
 use handeye::rig::Rig;
@@ -9,6 +9,7 @@ use nalgebra::Matrix6;
 use numpy::ndarray::{ArrayView1, Axis, Ix2, Ix3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::path::PathBuf;
 
 /// What `Recording.from_arrays` takes; dictionaries in their order.
 pub struct Arrays<'a, 'py> {
@@ -105,7 +106,7 @@ impl Arrays<'_, '_> {
         let mut cameras: Vec<RecordedCamera> =
             self.rig.map_or_else(Vec::new, |rig| rig.cameras.iter().map(RecordedCamera::from).collect());
         for (name, known) in self.cameras.iter().flatten() {
-            let camera = read_camera(name.extract()?, known.cast::<PyDict>()?)?;
+            let camera = read_camera(&name, &known)?;
             match cameras.iter_mut().find(|other| other.name == camera.name) {
                 Some(other) => *other = camera,
                 None => cameras.push(camera),
@@ -245,7 +246,12 @@ fn each<const N: usize>(
     Ok(())
 }
 
-fn read_camera(name: String, known: &Bound<'_, PyDict>) -> PyResult<RecordedCamera> {
+/// A camera by its name: a dictionary of what is known of it, or the path of a calibration file.
+pub fn read_camera(name: &Bound<'_, PyAny>, known: &Bound<'_, PyAny>) -> PyResult<RecordedCamera> {
+    let name: String = name.extract()?;
+    let Ok(known) = known.cast::<PyDict>() else {
+        return RecordedCamera::read(&name, &known.extract::<PathBuf>()?).map_err(raise);
+    };
     let mut camera = RecordedCamera { name, ..RecordedCamera::default() };
     for (key, value) in known {
         let key: String = key.extract()?;

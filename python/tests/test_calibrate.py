@@ -28,12 +28,14 @@ def test_a_rig_is_learned_from_the_recording_alone(learned, fresh):
 def test_the_learned_rig_is_that_of_the_command_byte_for_byte(motions, ur5, tmp_path, with_rig):
     motions.save(tmp_path / "motions.jsonl")
     command = [sys.executable, "-m", "handeye", "calibrate", tmp_path / "motions.jsonl", "-o", tmp_path / "learned.toml"]
-    subprocess.run([*command, *(["--rig", "ur5"] if with_rig else [])], check=True, capture_output=True)
+    command += ["--report", tmp_path / "page.html", *(["--rig", "ur5"] if with_rig else [])]
+    subprocess.run(command, check=True, capture_output=True)
     for threads in (1, 2, None):
         learned = handeye.calibrate(handeye.Recording.load(tmp_path / "motions.jsonl"), ur5 if with_rig else None, threads=threads)
         learned.rig.save(tmp_path / "ours.toml")
         assert (tmp_path / "ours.toml").read_bytes() == (tmp_path / "learned.toml").read_bytes()
         assert learned.rig.to_toml() == (tmp_path / "learned.toml").read_text()
+    assert learned.html(str(tmp_path / "learned.toml")) == (tmp_path / "page.html").read_text()
 
 
 def test_errors_are_those_of_the_pixels_counted_here(learned, fresh):

@@ -205,3 +205,38 @@ def write_bag(bags, path, recording):
                 ]
                 write(f"/{camera}/features", of_pixels, {"detections": found}, camera)
         writer.finish()
+
+
+def test_options_of_other_formats_and_words_that_say_nothing_are_refused(motions, tmp_path):
+    path = tmp_path / "motions.jsonl"
+    motions.save(path)
+    for wrong, message in [
+        ({"frames": ("base", "tip")}, "frames: none of the recordings is a bag, so that it has no effect"),
+        ({"camera_topics": {}}, "camera_topics: none of the recordings is a bag"),
+        ({"degrees": True}, "degrees: none of the recordings is a table"),
+        ({"episodes": [0]}, "episodes: none of the recordings is a table"),
+        ({"cameras": {"nose": {"size": (640, 480)}}}, "there are no images of a camera `nose`"),
+    ]:
+        with pytest.raises(handeye.UnusableInput, match=message):
+            handeye.Recording.load(path, **wrong)
+
+
+def test_tables_say_their_units_actions_and_lenses_by_keywords(tmp_path):
+    table = tmp_path / "motions.csv"
+    table.write_text("joints.a,joints.b,action.a,action.b,left.f0.u,left.f0.v\n90,0.2,91,0.3,1,2\n80,0.1,81,0.2,3,4\n")
+    lens = tmp_path / "left.yaml"
+    lens.write_text(
+        "image_width: 640\nimage_height: 480\ndistortion_model: plumb_bob\ncamera_matrix: {rows: 3, cols: 3, data: [600, 0, 320, 0, 601, 240, 0, 0, 1]}\n"
+        "distortion_coefficients: {rows: 1, cols: 5, data: [0.1, 0, 0, 0, 0]}\n"
+    )
+    with pytest.raises(handeye.UnusableInput, match="degrees"):
+        handeye.Recording.load(table)
+    with pytest.warns(UserWarning):
+        read = handeye.Recording.load(table, degrees=["a"], actions="targets", cameras={"left": lens})
+    np.testing.assert_allclose(read.joints, [[np.pi / 2, 0.2], [np.deg2rad(80), 0.1]])
+    np.testing.assert_allclose(read.joint_actions[0], [np.deg2rad(1), 0.1])
+    assert read.cameras["left"]["fy"] == 601.0 and read.cameras["left"]["size"] == (640, 480)
+    with pytest.raises(handeye.UnusableInput, match="neither targets nor motions"):
+        handeye.Recording.load(table, degrees=["a"], actions="target")
+    with pytest.raises(handeye.UnusableInput, match="joints are in one of them"):
+        handeye.Recording.load(table, degrees=True, radians=True)

@@ -10,16 +10,13 @@ use super::words::{cameras_json, count, duration, error_table, points_json};
 use clap::Args;
 use handeye::Error;
 use handeye::calibrate::{
-    Calibration, Distance, Errors, Finding, NoiseTrial, Options, Progress, Report, SuggestOptions, TargetReport,
-    TipDeviation, calibrate, relearn, select_noise, suggest,
+    Calibration, Distance, Errors, Finding, NoiseTrial, Options, Progress, Report, TargetReport, TipDeviation,
+    calibrate, relearn, select_noise,
 };
 use handeye::report;
 use handeye::rig::Rig;
 use serde_json::{Value, json};
 use std::path::PathBuf;
-
-/// Positions to move to next that a page suggests.
-const SUGGESTED: usize = 3;
 
 /// Learn what is unknown of a rig from recordings, and refine the rest
 ///
@@ -104,10 +101,8 @@ impl Calibrate {
                 relearn(&rig, &recording, &self.relearn, &options, &mut show)?
             };
             let seconds = start.elapsed().as_secs_f64();
-            // Where it cannot be said where to move, as for an arm of which no range is known, the page goes without.
-            let next = SuggestOptions { count: SUGGESTED, ..SuggestOptions::default() };
-            let suggestion =
-                self.report.as_ref().and_then(|_| suggest(&calibration.rig, Some(&recording), Some(&rig), &next).ok());
+            let next = || report::suggestion(&calibration.rig, &recording, &rig);
+            let suggestion = self.report.as_ref().and_then(|_| next());
             Ok((trials, folds, calibration, suggestion, seconds))
         })?;
         drop(bar);

@@ -1,7 +1,6 @@
 //! Reading a rig and the recordings that go with it, and seeing in time that an output can be written.
 use super::answer::remark;
 use handeye::Error;
-use handeye::intrinsics::read_intrinsics;
 use handeye::recording::{OpenOptions, Opened, RecordedCamera, Recording, Sample};
 use handeye::rig::{Rig, catalog, matches, replace_file};
 use std::io;
@@ -82,24 +81,11 @@ pub fn read_camera(text: &str) -> Result<RecordedCamera, Error> {
     let Some((name, value)) = text.split_once('=') else {
         return Err(Error::Unusable(format!("--camera {text}: expected NAME=WIDTHxHEIGHT or NAME=FILE")));
     };
-    let camera = RecordedCamera { name: name.to_owned(), ..RecordedCamera::default() };
     let side = |side: &str| side.parse::<u32>().ok().filter(|side| *side > 0);
     if let Some(size) = value.split_once('x').and_then(|(width, height)| Some([side(width)?, side(height)?])) {
-        return Ok(RecordedCamera { size: Some(size), ..camera });
+        return Ok(RecordedCamera { name: name.to_owned(), size: Some(size), ..RecordedCamera::default() });
     }
-    let path = Path::new(value);
-    let file = std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
-    let read = read_intrinsics(&file, value, None)?;
-    Ok(RecordedCamera {
-        size: read.size,
-        model: Some(read.model),
-        fx: Some(read.focal[0]),
-        fy: Some(read.focal[1]),
-        cx: Some(read.centre[0]),
-        cy: Some(read.centre[1]),
-        distortion: Some(read.distortion).filter(|coefficients| !coefficients.is_empty()),
-        ..camera
-    })
+    RecordedCamera::read(name, Path::new(value))
 }
 
 /// True where two paths name one file, which need not exist yet.

@@ -1,6 +1,9 @@
 //! What is known of a recording's cameras beside it.
 use super::{RecordedCamera, Recording};
+use crate::Error;
 use crate::error::suggestion;
+use crate::intrinsics::read_intrinsics;
+use std::path::Path;
 
 impl Recording {
     /// Adds what is known of its cameras, by their names. A lens replaces the one that the recording has; where only a size is known, that stays.
@@ -29,6 +32,24 @@ impl Recording {
 }
 
 impl RecordedCamera {
+    /// A camera whose lens and size a calibration file says (YAML of ROS, OpenCV or Kalibr).
+    ///
+    /// Errors: [`Error::Io`], and those of [`read_intrinsics`].
+    pub fn read(name: &str, path: &Path) -> Result<RecordedCamera, Error> {
+        let text = std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
+        let read = read_intrinsics(&text, &path.display().to_string(), None)?;
+        Ok(RecordedCamera {
+            name: name.to_owned(),
+            size: read.size,
+            model: Some(read.model),
+            fx: Some(read.focal[0]),
+            fy: Some(read.focal[1]),
+            cx: Some(read.centre[0]),
+            cy: Some(read.centre[1]),
+            distortion: Some(read.distortion).filter(|coefficients| !coefficients.is_empty()),
+        })
+    }
+
     /// What is known here, and of the rest what `other` says. A lens is taken whole: parts of two would be none.
     pub(super) fn over(&self, other: &RecordedCamera) -> RecordedCamera {
         let lens = if self.has_lens() { self } else { other };

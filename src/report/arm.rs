@@ -14,12 +14,13 @@ const TIPS: usize = 500;
 const STATES: usize = 500;
 
 /// Which arms are drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Shown {
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Shown<'a> {
     /// The first and a few others, spread over the samples.
     Few,
-    /// One after the other: that of the moment which the page shows. There are at most [`thinned`] of them.
-    Each,
+    /// One after the other: that of the moment which the page shows, with the features that are there then, in the world. There are at most
+    /// [`thinned`] of them.
+    Each(&'a [&'a [Vector3<f64>]]),
 }
 
 /// Every how many samples are shown where each of so many shall be.
@@ -28,7 +29,7 @@ pub(super) fn thinned(count: usize) -> usize {
 }
 
 /// Draws the arm in some samples, the tip in all.
-pub(super) fn view(page: &mut Page, rig: &Rig, recording: &Recording, shown: Shown) -> Result<(), Error> {
+pub(super) fn view(page: &mut Page, rig: &Rig, recording: &Recording, shown: Shown<'_>) -> Result<(), Error> {
     let model = Model::new(rig)?;
     let samples = &recording.samples;
     let of_sample = |sample: &crate::recording::Sample| {
@@ -43,20 +44,24 @@ pub(super) fn view(page: &mut Page, rig: &Rig, recording: &Recording, shown: Sho
     let spread = |most: usize| (0..states.len()).step_by(states.len().div_ceil(most).max(1));
     let arms: Vec<usize> = match shown {
         Shown::Few => spread(ARMS + 1).collect(),
-        Shown::Each => (0..states.len()).step_by(thinned(states.len())).collect(),
+        Shown::Each(_) => (0..states.len()).step_by(thinned(states.len())).collect(),
     };
     let tip = |placed: &Placed| placed.links[placed.links.len() - 1].translation;
     let is_placed = |parent: Parent| !(states[0].is_tip_alone && is_inner(parent, &model));
-    let features = |state: &Placed| -> Vec<Vector3<f64>> {
+    let features = |index: usize| -> Vec<Vector3<f64>> {
+        if let Shown::Each(given) = shown {
+            return given.get(index).map_or(Vec::new(), |features| features.to_vec());
+        }
         let placed = model.features.iter().filter(|feature| is_placed(feature.parent));
-        placed.map(|feature| model.carrier(feature.parent, &state.links).transform(&feature.xyz)).collect()
+        let links = &states[index].links;
+        placed.map(|feature| model.carrier(feature.parent, links).transform(&feature.xyz)).collect()
     };
     let cameras = |state: &Placed| -> Vec<(usize, Pose)> {
         let placed = model.cameras.iter().enumerate().filter(|(_, camera)| is_placed(camera.parent));
         placed.map(|(index, camera)| (index, model.carrier(camera.parent, &state.links) * camera.pose)).collect()
     };
     let tips: Vec<Vector3<f64>> = spread(TIPS).map(|index| tip(&states[index])).collect();
-    let (first_features, first_cameras) = (features(&states[0]), cameras(&states[0]));
+    let (first_features, first_cameras) = (features(0), cameras(&states[0]));
     let all = || {
         tips.iter()
             .copied()
@@ -72,9 +77,9 @@ pub(super) fn view(page: &mut Page, rig: &Rig, recording: &Recording, shown: Sho
         json!([numbers(&model.base.translation), numbers(&end)])
     };
     // What the arm carries moves with it where arms follow each other.
-    let moves = shown == Shown::Each;
+    let moves = matches!(shown, Shown::Each(_));
     let carried = |is_carried: bool| if is_carried && moves { arms.clone() } else { vec![0] };
-    let with_features = carried(model.features.iter().any(|feature| feature.parent != Parent::World));
+    let with_features = carried(true);
     let with_cameras = carried(model.cameras.iter().any(|camera| camera.parent != Parent::World));
     let frusta = |index: &usize| -> Value {
         let placed = cameras(&states[*index]);
@@ -87,7 +92,7 @@ pub(super) fn view(page: &mut Page, rig: &Rig, recording: &Recording, shown: Sho
         "moves": moves,
         "arms": arms.iter().map(arm).collect::<Vec<_>>(),
         "tips": tips.iter().map(numbers).collect::<Vec<_>>(),
-        "features": with_features.iter().map(|index| features(&states[*index]).iter().map(numbers).collect()).collect::<Vec<Value>>(),
+        "features": with_features.iter().map(|index| features(*index).iter().map(numbers).collect()).collect::<Vec<Value>>(),
         "cameras": with_cameras.iter().map(frusta).collect::<Vec<_>>(),
         "axes": (0..3).map(axis).collect::<Vec<_>>(),
     });
@@ -96,7 +101,7 @@ pub(super) fn view(page: &mut Page, rig: &Rig, recording: &Recording, shown: Sho
         &data.to_string(),
         match shown {
             Shown::Few => "drag to turn: the arm in its first sample and in others, the tip in all, features, cameras; axes at the base",
-            Shown::Each => "drag to turn: the arm at the moment shown above and at first, the way of the tip, features, cameras; axes at the base",
+            Shown::Each(_) => "drag to turn: the arm at the moment shown above and at first, the way of the tip, features, cameras; axes at the base",
         },
     );
     Ok(())

@@ -3,7 +3,7 @@ use super::page::Page;
 use super::sections::WORST;
 use super::{arm, residuals, sections, values};
 use crate::Error;
-use crate::calibrate::{Calibration, DeterminedBy, Finding, SuggestedSample, Suggestion};
+use crate::calibrate::{Calibration, DeterminedBy, Finding, SuggestOptions, SuggestedSample, Suggestion, suggest};
 use crate::recording::Recording;
 use crate::rig::Rig;
 
@@ -31,6 +31,16 @@ pub struct ExtraTable {
     pub header: Vec<String>,
     /// Its cells, row by row.
     pub rows: Vec<Vec<String>>,
+}
+
+/// Positions to move to next that a page suggests.
+const SUGGESTED: usize = 3;
+
+/// Where to move next, for [`Subject::suggestion`]; `None` where that cannot be said, as for an arm of which no range is known. `before`: the
+/// rig that learning started from.
+pub fn suggestion(learned: &Rig, recording: &Recording, before: &Rig) -> Option<Suggestion> {
+    let options = SuggestOptions { count: SUGGESTED, ..SuggestOptions::default() };
+    suggest(learned, Some(recording), Some(before), &options).ok()
 }
 
 /// The page of a calibration.

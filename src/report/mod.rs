@@ -9,7 +9,7 @@ mod sections;
 mod servo;
 mod values;
 
-pub use calibration::{ExtraTable, Subject, html};
+pub use calibration::{ExtraTable, Subject, html, suggestion};
 pub use evaluation::evaluation_html;
 pub use residuals::{Residual, residuals};
 pub use servo::servo_html;

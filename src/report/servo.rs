@@ -8,6 +8,7 @@ use crate::recording::{Recording, Sample};
 use crate::rig::Rig;
 use crate::scene::{Moment, Run};
 use crate::servo::Stop;
+use nalgebra::Vector3;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -25,7 +26,8 @@ pub fn servo_html(title: &str, rig: &Rig, has_rig: bool, run: &Run) -> Result<St
     images(&mut page, run, stride);
     let joints = |moment: &Moment| Sample { joints: Some(moment.joints.clone()), ..Sample::default() };
     let samples = run.moments.iter().map(joints).collect();
-    view(&mut page, rig, &Recording { samples, ..run.header.clone() }, Shown::Each)?;
+    let features: Vec<&[Vector3<f64>]> = run.moments.iter().map(|moment| &moment.features[..]).collect();
+    view(&mut page, rig, &Recording { samples, ..run.header.clone() }, Shown::Each(&features))?;
     errors(&mut page, run);
     joint_curves(&mut page, rig, run);
     held_back(&mut page, rig, run);

@@ -7,6 +7,7 @@ use crate::infer::{Names, Sighting};
 use crate::recording::{Detection, Recording, Sample};
 use crate::rig::Rig;
 use crate::servo::{Active, Command, Constraint, Controller, Limit, Measurement, ServoLoop, Stop};
+use nalgebra::Vector3;
 use std::ops::ControlFlow;
 
 /// What happened in a scene.
@@ -37,6 +38,8 @@ pub struct Moment {
     pub error_m: f64,
     /// Where the joints truly are [rad or m].
     pub joints: Vec<f64>,
+    /// Where the features truly are [m], in the order of the header.
+    pub features: Vec<Vector3<f64>>,
     /// What is seen.
     pub pixels: Vec<Detection>,
     /// What is aimed at; of a task, where what is on the hand would be seen.
@@ -108,6 +111,7 @@ fn run_in(
             error_px: tick.error_px,
             error_m,
             joints: world.joints().to_vec(),
+            features: world.features(),
             pixels: sample.pixels,
             goal,
             active: tick.active,

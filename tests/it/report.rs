@@ -1,11 +1,14 @@
 //! `--report` writes a page that holds everything, stands alone, and says what was found.
 use crate::cli::Folder;
 use handeye::calibrate::{Options, calibrate};
-use handeye::report::{Subject, html, residuals};
+use handeye::report::{Subject, html, residuals, servo_html};
 use handeye::rig::{Model, Parent, Rig, catalog};
+use handeye::scene::{Moment, Scene};
+use handeye::servo::image_tasks::Place;
 use handeye::simulate::{SimulateOptions, simulate};
 use serde_json::Value;
 use std::ops::ControlFlow;
+use std::path::Path;
 
 /// Headings of a page from nothing but a recording.
 const SECTIONS: &[&str] = &[
@@ -233,4 +236,35 @@ fn a_servo_run_has_a_page_that_plays_what_the_cameras_saw() {
     assert!(complaint.contains("two outputs"), "{complaint}");
     folder.expect(0, "servo ur5-uncalibrated --report page.html");
     assert!(folder.read("page.html").contains("<h2>How it ended</h2>"));
+}
+
+#[test]
+fn the_page_of_a_task_shows_what_its_hand_and_its_target_carry() {
+    let known = catalog::rig("ur5").unwrap();
+    let (_, text) = handeye::scene::ALL.iter().find(|(name, _)| *name == "ur5-wrench").unwrap();
+    let scene = Scene::parse(text, "ur5-wrench", Path::new(".")).unwrap();
+    let run = handeye::scene::run(Some(&known), &scene, &mut |_| ControlFlow::Continue(())).unwrap();
+    let world = scene.rig.as_ref().unwrap_or(&known);
+    let page = servo_html("wrench", world, true, &run).unwrap();
+    let drawn = data(&page, 2);
+    let names = &run.header.features;
+    assert!(names.iter().all(|name| known.features.iter().all(|feature| feature.name != *name)), "{names:?}");
+    let tip = |moment: &Moment| Model::new(world).unwrap().tip(&moment.joints);
+    let [first, last] = [run.moments.first().unwrap(), run.moments.last().unwrap()];
+    for (index, name) in names.iter().enumerate() {
+        for (step, moment) in run.moments.iter().enumerate() {
+            for axis in 0..3 {
+                let there = drawn["features"][step][index][axis].as_f64().unwrap();
+                assert!((there - moment.features[index][axis]).abs() < 1e-4, "{name}, step {step}");
+            }
+        }
+        // What the hand carries moves with it, what the target carries stands.
+        let place = &scene.task.as_ref().unwrap().features()[index].place;
+        let in_tip = |moment: &Moment| tip(moment).inverse().transform(&moment.features[index]);
+        let moved = match place {
+            Place::Hand(_) => in_tip(first) - in_tip(last),
+            _ => first.features[index] - last.features[index],
+        };
+        assert!(moved.norm() < 1e-9, "{name} moved by {} m", moved.norm());
+    }
 }

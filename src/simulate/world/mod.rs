@@ -216,6 +216,16 @@ impl World {
         if is_known { in_world(&self.model, feature, &links, &self.objects) } else { Vector3::repeat(f64::NAN) }
     }
 
+    /// Where all features truly are [m], in the order of the header.
+    pub fn features(&self) -> Vec<Vector3<f64>> {
+        let links = self.model.links(&self.joints);
+        let mut features = vec![Vector3::zeros(); self.places.len()];
+        for (feature, place) in self.places.iter().enumerate() {
+            features[*place as usize] = in_world(&self.model, feature, &links, &self.objects);
+        }
+        features
+    }
+
     /// Seconds since the beginning.
     pub fn time(&self) -> f64 {
         self.time
