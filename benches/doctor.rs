@@ -1,4 +1,6 @@
-//! How often the doctor finds each of its faults, and how often it finds one in clean recordings: `cargo bench --bench doctor 20`.
+//! How often the doctor finds each of its faults, and how often it finds one in clean recordings.
+//!
+//! `cargo bench --bench doctor -- [TRIALS] [WORD]...`: rows whose names hold one of the words, all where none is given.
 #[path = "common/faults.rs"]
 mod faults;
 
@@ -11,30 +13,43 @@ use handeye::simulate::{SimulateOptions, random_rig, simulate};
 
 fn main() {
     let trials = std::env::args().skip(1).find_map(|argument| argument.parse().ok()).unwrap_or(100);
+    let words: Vec<String> =
+        std::env::args().skip(1).filter(|word| word.parse::<u64>().is_err() && word != "--bench").collect();
+    let table = |setting: &str, faults: &[Fault], trials: u64, data: &dyn Fn(u64) -> (Rig, Recording)| {
+        table(setting, faults, trials, &words, data);
+    };
     println!("{:56} {:>8} {:>8} of {trials}", "", "found", "others");
-    table("targets and tip poses", &faults::of_targets(), trials, |seed| faults::targets(seed, 30, false));
-    table("tip poses and pixels, random rig", &faults::of_tips(), trials, |seed| {
+    table("targets and tip poses", &faults::of_targets(), trials, &|seed| faults::targets(seed, 30, false));
+    table("tip poses and pixels, random rig", &faults::of_tips(), trials, &|seed| {
         by_tips(&random_rig(6, 2, 12, seed), seed)
     });
-    table("joints and pixels, random rig", &faults::of_joints(), trials, |seed| {
+    table("joints and pixels, random rig", &faults::of_joints(), trials, &|seed| {
         by_joints(&random_rig(6, 2, 12, seed), seed)
     });
-    table("joints and pixels, a random rig on the move", &faults::of_dense_motion(), trials, faults::dense_motion);
+    table("joints and pixels, a random rig on the move", &faults::of_dense_motion(), trials, &faults::dense_motion);
     if let Some((rig, recording)) = ur3e() {
         let tips = tips_in_place_of_joints(&rig, &recording);
-        table("ur3e-checkerboard, 25 tip poses of it", &faults::of_tips(), trials, |seed| {
+        table("ur3e-checkerboard, 25 tip poses of it", &faults::of_tips(), trials, &|seed| {
             (tips.0.clone(), part(&tips.1, seed))
         });
-        table("ur3e-checkerboard, 25 samples of it", &faults::of_joints(), trials, |seed| {
+        table("ur3e-checkerboard, 25 samples of it", &faults::of_joints(), trials, &|seed| {
             (rig.clone(), part(&recording, seed))
         });
     }
 }
 
-fn table(setting: &str, faults: &[Fault], trials: u64, data: impl Fn(u64) -> (Rig, Recording)) {
-    let clean = (1..=trials).filter(|seed| !found(&data(*seed)).is_empty()).count();
-    println!("{:56} {:>8} {clean:8}", format!("{setting}, clean"), "");
+fn table(setting: &str, faults: &[Fault], trials: u64, words: &[String], data: &dyn Fn(u64) -> (Rig, Recording)) {
+    let is_wanted = |name: &str| words.is_empty() || words.iter().any(|word| name.contains(word.as_str()));
+    let clean = format!("{setting}, clean");
+    if is_wanted(&clean) {
+        let alarms = (1..=trials).filter(|seed| !found(&data(*seed)).is_empty()).count();
+        println!("{clean:56} {:>8} {alarms:8}", "");
+    }
     for fault in faults {
+        let name = format!("{setting}, {}", fault.name);
+        if !is_wanted(&name) {
+            continue;
+        }
         let (mut hits, mut others) = (0, 0);
         for seed in 1..=trials {
             let mut data = data(seed);
@@ -44,7 +59,7 @@ fn table(setting: &str, faults: &[Fault], trials: u64, data: impl Fn(u64) -> (Ri
             hits += usize::from(hit > 0);
             others += usize::from(found.len() > hit);
         }
-        println!("{:56} {hits:8} {others:8}", format!("{setting}, {}", fault.name));
+        println!("{name:56} {hits:8} {others:8}");
     }
 }
 
@@ -71,7 +86,8 @@ fn by_tips(rig: &Rig, seed: u64) -> (Rig, Recording) {
 
 /// The real recording without its own mistakes, where it is beside the project.
 fn ur3e() -> Option<(Rig, Recording)> {
-    let folder = std::path::Path::new("../shared/data/ur3e-checkerboard");
+    let shared = std::env::var("HANDEYE_SHARED").unwrap_or_else(|_| "../shared".to_owned());
+    let folder = std::path::Path::new(&shared).join("data/ur3e-checkerboard");
     let mut rig = Rig::read(&folder.join("ur3e.toml")).ok()?;
     let mut recording = Recording::read(&folder.join("recording.jsonl")).ok()?;
     rig.cameras.retain(|camera| camera.name != "cam3");
