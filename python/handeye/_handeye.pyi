@@ -75,6 +75,7 @@ __version__: Final[str]
 # Arguments and results that have no name at runtime.
 _Array = NDArray[np.float64]
 _Path = str | os.PathLike[str]
+_AnyRig = Rig | _Path
 _Pixels = Mapping[str, ArrayLike]
 
 @type_check_only
@@ -192,7 +193,7 @@ class Recording:
     def load(
         paths: _Path | Sequence[_Path],
         *,
-        rig: Rig | None = None,
+        rig: _AnyRig | None = None,
         joint_topic: str | None = None,
         joints: Sequence[str] | None = None,
         pose_topic: str | None = None,
@@ -222,7 +223,7 @@ class Recording:
         joint_names: Sequence[str] | None = None,
         feature_names: Sequence[str] | None = None,
         cameras: Mapping[str, _Camera | _Path] | None = None,
-        rig: Rig | None = None,
+        rig: _AnyRig | None = None,
     ) -> Recording: ...
     def save(self, path: _Path) -> None: ...
     def to_jsonl(self) -> str: ...
@@ -272,7 +273,7 @@ class Simulation:
     def outliers(self) -> int: ...
 
 def simulate(
-    rig: Rig,
+    rig: _AnyRig,
     samples: int = 50,
     seed: int = 1,
     *,
@@ -295,7 +296,7 @@ class Progress:
 
 def calibrate(
     recording: Recording,
-    rig: Rig | None = None,
+    rig: _AnyRig | None = None,
     *,
     relearn: Sequence[str] | None = None,
     estimate_noise: bool = False,
@@ -459,8 +460,8 @@ class Evaluation:
     def report(self, path: _Path, title: str | None = None) -> None: ...
     def html(self, title: str | None = None) -> str: ...
 
-def evaluate(rig: Rig, recording: Recording) -> Evaluation: ...
-def residuals(rig: Rig, recording: Recording) -> dict[str, _Array]: ...
+def evaluate(rig: _AnyRig, recording: Recording) -> Evaluation: ...
+def residuals(rig: _AnyRig, recording: Recording) -> dict[str, _Array]: ...
 @final
 class Branch:
     @property
@@ -491,7 +492,7 @@ class InferredPose:
 
 @final
 class Inference:
-    def __new__(cls, rig: Rig, *, starts: int = 60, pixel_starts: int = 60, seed: int = 1) -> Self: ...
+    def __new__(cls, rig: _AnyRig, *, starts: int = 60, pixel_starts: int = 60, seed: int = 1) -> Self: ...
     def joints(
         self,
         pixels: _Pixels,
@@ -529,7 +530,7 @@ class Inferred:
     def __len__(self) -> int: ...
 
 def infer(
-    rig: Rig, recording: Recording, *, actions: bool = False, readings: bool = False, seed: int = 1
+    rig: _AnyRig, recording: Recording, *, actions: bool = False, readings: bool = False, seed: int = 1
 ) -> Inferred: ...
 @final
 class Reached:
@@ -546,7 +547,7 @@ class Reached:
 class InverseKinematics:
     def __new__(
         cls,
-        rig: Rig,
+        rig: _AnyRig,
         *,
         xyz: float = 1e-07,
         rot: float = 1e-07,
@@ -614,7 +615,7 @@ class Task: ...
 
 @final
 class ImagePoints(Task):
-    def __new__(cls, rig: Rig, targets: _Pixels, *, seen: _Pixels | None = None, sd: float = 1.0) -> Self: ...
+    def __new__(cls, rig: _AnyRig, targets: _Pixels, *, seen: _Pixels | None = None, sd: float = 1.0) -> Self: ...
     def see(self, seen: _Pixels) -> None: ...
     def aim(self, targets: _Pixels) -> None: ...
 
@@ -653,7 +654,7 @@ class HalfSpace(Limit):
 class InImage(Limit):
     def __new__(
         cls,
-        rig: Rig,
+        rig: _AnyRig,
         camera: str,
         *,
         features: Sequence[str] | None = None,
@@ -664,7 +665,7 @@ class InImage(Limit):
 @final
 class PixelSpeed(Limit):
     def __new__(
-        cls, rig: Rig, camera: str, speed: float, *, features: Sequence[str] | None = None, strength: float = 10.0
+        cls, rig: _AnyRig, camera: str, speed: float, *, features: Sequence[str] | None = None, strength: float = 10.0
     ) -> Self: ...
 
 @final
@@ -701,7 +702,7 @@ class Goal:
 
 @final
 class Stepper:
-    def __new__(cls, rig: Rig, *, damping: float = 0.001) -> Self: ...
+    def __new__(cls, rig: _AnyRig, *, damping: float = 0.001) -> Self: ...
     def step(
         self,
         joints: ArrayLike,
@@ -761,7 +762,7 @@ class Controller:
 
 @final
 class ModelBased(Controller):
-    def __new__(cls, rig: Rig, *, takes: _Takes = "joint-deltas") -> Self: ...
+    def __new__(cls, rig: _AnyRig, *, takes: _Takes = "joint-deltas") -> Self: ...
     @property
     def joints(self) -> _Array | None: ...
     @property
@@ -769,13 +770,13 @@ class ModelBased(Controller):
 
 @final
 class ModelBasedTip(Controller):
-    def __new__(cls, rig: Rig, *, takes: _Takes = "pose-deltas", speed: Sequence[float] = ...) -> Self: ...
+    def __new__(cls, rig: _AnyRig, *, takes: _Takes = "pose-deltas", speed: Sequence[float] = ...) -> Self: ...
 
 @final
 class ImageBased(Controller):
     def __new__(
         cls,
-        rig: Rig,
+        rig: _AnyRig,
         *,
         matrix: _Matrix = "mean",
         gain: _Gain = ...,
@@ -787,7 +788,7 @@ class ImageBased(Controller):
 class PoseBased(Controller):
     def __new__(
         cls,
-        rig: Rig,
+        rig: _AnyRig,
         *,
         matrix: _Matrix = "mean",
         gain: _Gain = ...,
@@ -814,7 +815,7 @@ class UncalibratedJoints(Controller):
     ) -> Self: ...
     @staticmethod
     def with_rig(
-        rig: Rig, *, sd_px: float = 0.5, gain: float | None = None, takes: _Takes = "joint-deltas"
+        rig: _AnyRig, *, sd_px: float = 0.5, gain: float | None = None, takes: _Takes = "joint-deltas"
     ) -> UncalibratedJoints: ...
 
 @final

@@ -2,7 +2,7 @@
 use crate::errors::raise;
 use crate::evaluate::by_camera;
 use crate::recording::Recording;
-use crate::rig::Rig;
+use crate::rig::{AnyRig, Rig};
 use crate::work;
 use handeye::calibrate::{self as library, DeterminedBy, NoiseTrial, Options, Report};
 use handeye::report::{Subject, html, suggestion};
@@ -32,7 +32,7 @@ use std::sync::Arc;
 pub fn calibrate(
     py: Python<'_>,
     recording: &Recording,
-    rig: Option<&Rig>,
+    rig: Option<AnyRig<'_>>,
     relearn: Option<Vec<String>>,
     estimate_noise: bool,
     select_noise: bool,

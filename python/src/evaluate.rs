@@ -2,7 +2,7 @@
 use crate::arrays::{NewArray, array};
 use crate::errors::raise;
 use crate::recording::Recording;
-use crate::rig::Rig;
+use crate::rig::AnyRig;
 use handeye::calibrate::{self as library, CameraErrors};
 use handeye::report;
 use handeye::rig::replace_file;
@@ -169,7 +169,7 @@ impl Evaluation {
 ///
 /// Raises ``UnusableInput`` where the rig is not complete or has another number of joints, ``NotDone`` where there is nothing to compare.
 #[pyfunction]
-pub fn evaluate(py: Python<'_>, rig: &Rig, recording: &Recording) -> PyResult<Evaluation> {
+pub fn evaluate(py: Python<'_>, rig: AnyRig<'_>, recording: &Recording) -> PyResult<Evaluation> {
     let (rig, recording) = (&rig.inner, &recording.inner);
     let inner = py.detach(|| library::evaluate(rig, recording)).map_err(raise)?;
     Ok(Evaluation { inner, rig: rig.clone(), recording: recording.clone() })
@@ -180,7 +180,7 @@ pub fn evaluate(py: Python<'_>, rig: &Rig, recording: &Recording) -> PyResult<Ev
 ///
 /// Raises ``UnusableInput`` where the rig is not complete or has another number of joints.
 #[pyfunction]
-pub fn residuals<'py>(py: Python<'py>, rig: &Rig, recording: &Recording) -> PyResult<Bound<'py, PyDict>> {
+pub fn residuals<'py>(py: Python<'py>, rig: AnyRig<'_>, recording: &Recording) -> PyResult<Bound<'py, PyDict>> {
     let (rig, recording) = (&rig.inner, &recording.inner);
     let found = py.detach(|| report::residuals(rig, recording)).map_err(raise)?;
     let (samples, features) = (recording.samples.len(), recording.features.len());

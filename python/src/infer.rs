@@ -2,7 +2,7 @@
 use crate::arrays::{Floats, NewArray, array, homogeneous, list, matrix, rows, vector};
 use crate::errors::{raise, unusable};
 use crate::recording::Recording;
-use crate::rig::Rig;
+use crate::rig::AnyRig;
 use crate::sight::Layout;
 use handeye::Error;
 use handeye::infer::{self as library, InferOptions, Names, PointSighting, Prior, Sighting, Sightings};
@@ -28,7 +28,7 @@ impl Inference {
     /// the tip. seed: the same seed gives the same result.
     #[new]
     #[pyo3(signature = (rig, *, starts = 60, pixel_starts = 60, seed = 1))]
-    fn new(rig: &Rig, starts: usize, pixel_starts: usize, seed: u64) -> PyResult<Self> {
+    fn new(rig: AnyRig<'_>, starts: usize, pixel_starts: usize, seed: u64) -> PyResult<Self> {
         let inner = library::Inference::new(&rig.inner, InferOptions { starts, pixel_starts, seed }).map_err(raise)?;
         let (layout, n_joints) = (Layout::of(&rig.inner), rig.inner.robot.joints.len());
         Ok(Inference { inner, layout, n_joints, pixels: Vec::new() })
@@ -239,7 +239,7 @@ pub struct Inferred {
 #[pyo3(signature = (rig, recording, *, actions = false, readings = false, seed = 1))]
 pub fn infer(
     py: Python<'_>,
-    rig: &Rig,
+    rig: AnyRig<'_>,
     recording: &Recording,
     actions: bool,
     readings: bool,

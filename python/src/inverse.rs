@@ -1,7 +1,7 @@
 //! `InverseKinematics`: the pose of the tip to joints.
 use crate::arrays::{Floats, list, pose, vector};
 use crate::errors::raise;
-use crate::rig::Rig;
+use crate::rig::AnyRig;
 use handeye::infer::{self as library, InverseOptions};
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -19,7 +19,7 @@ impl InverseKinematics {
     /// of reach. starts: tried before a pose counts as out of reach. seed: the same seed gives the same solution.
     #[new]
     #[pyo3(signature = (rig, *, xyz = 1e-7, rot = 1e-7, metres_per_radian = 0.3, starts = 100, seed = 1))]
-    fn new(rig: &Rig, xyz: f64, rot: f64, metres_per_radian: f64, starts: usize, seed: u64) -> PyResult<Self> {
+    fn new(rig: AnyRig<'_>, xyz: f64, rot: f64, metres_per_radian: f64, starts: usize, seed: u64) -> PyResult<Self> {
         let options = InverseOptions { xyz, rot, metres_per_radian, starts, seed };
         let inner = library::InverseKinematics::new(&rig.inner, options).map_err(raise)?;
         Ok(InverseKinematics { inner, n_joints: rig.inner.robot.joints.len() })

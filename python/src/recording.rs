@@ -2,7 +2,7 @@
 use crate::arrays::{Floats, NewArray, array, rows};
 use crate::errors::{raise, unusable};
 use crate::recording_arrays::{Arrays, read_camera};
-use crate::rig::Rig;
+use crate::rig::AnyRig;
 use handeye::recording::{self, Actions, Angles, BagOptions, Format, OpenOptions, RecordedCamera, TableOptions};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -78,7 +78,7 @@ impl Recording {
     fn load(
         py: Python<'_>,
         paths: Paths,
-        rig: Option<&Rig>,
+        rig: Option<AnyRig<'_>>,
         joint_topic: Option<String>,
         joints: Option<Vec<String>>,
         pose_topic: Option<String>,
@@ -130,8 +130,8 @@ impl Recording {
             Some("motions") => Actions::Motions,
             Some(other) => return Err(unusable(format!("actions: `{other}` is neither targets nor motions"))),
         };
-        let names = |rig: &Rig| rig.inner.robot.joints.iter().map(|joint| joint.name.clone()).collect::<Vec<String>>();
-        let known = rig.map(names);
+        let names = |rig: &AnyRig<'_>| rig.inner.robot.joints.iter().map(|joint| joint.name.clone()).collect::<Vec<String>>();
+        let known = rig.as_ref().map(names);
         let options = OpenOptions {
             joints: joints.unwrap_or_default(),
             known_joints: known.unwrap_or_default(),
@@ -202,7 +202,7 @@ impl Recording {
         joint_names: Option<Vec<String>>,
         feature_names: Option<Vec<String>>,
         cameras: Option<Bound<'_, PyDict>>,
-        rig: Option<&Rig>,
+        rig: Option<AnyRig<'_>>,
     ) -> PyResult<Self> {
         let [pixels, points] = [pixels, points].map(|of| of.map_or_else(Vec::new, |of| of.0));
         let [targets, target_covariances] = [targets, target_covariances].map(|of| of.map_or_else(Vec::new, |of| of.0));
@@ -219,7 +219,7 @@ impl Recording {
             joint_names,
             feature_names,
             cameras,
-            rig: rig.map(|rig| &rig.inner),
+            rig: rig.as_ref().map(|rig| &rig.inner),
         };
         Ok(arrays.recording()?.checked().map_err(raise)?.into())
     }

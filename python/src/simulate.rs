@@ -1,7 +1,7 @@
 //! `simulate` and `random_rig`.
 use crate::errors::{raise, unusable};
 use crate::recording::Recording;
-use crate::rig::Rig;
+use crate::rig::{AnyRig, Rig};
 use handeye::simulate::{self as library, SimulateOptions};
 use pyo3::prelude::*;
 
@@ -39,7 +39,7 @@ impl Simulation {
 #[expect(clippy::too_many_arguments, reason = "one keyword per option")]
 pub fn simulate(
     py: Python<'_>,
-    rig: &Rig,
+    rig: AnyRig<'_>,
     samples: usize,
     seed: u64,
     missed: f64,

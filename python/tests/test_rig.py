@@ -151,3 +151,16 @@ def test_every_shipped_rig_loads_and_moves():
         rig = handeye.Rig.load(name)
         assert rig.forward(np.zeros((2, rig.n_joints))).shape == (2, 4, 4)
         assert repr(rig).startswith("<handeye.Rig")
+
+
+def test_a_path_or_the_name_of_a_shipped_rig_is_as_good_as_the_rig(ur5, motions, tmp_path):
+    ur5.save(tmp_path / "mine.toml")
+    for rig in (str(tmp_path / "mine.toml"), tmp_path / "mine.toml", "ur5"):
+        assert handeye.evaluate(rig, motions).rms_px == handeye.evaluate(ur5, motions).rms_px
+        assert handeye.servo.Stepper(rig).step(np.zeros(6), [handeye.servo.JointTarget(np.ones(6))], dt=0.1).motion.shape == (6,)
+        plain = handeye.Recording.from_arrays(motions.joints, motions.pixels, rig=rig)
+        assert plain.joint_names == ur5.joint_names
+    with pytest.raises(handeye.UnusableInput, match="nowhere.toml"):
+        handeye.evaluate("nowhere.toml", motions)
+    with pytest.raises(TypeError, match="a rig is a handeye.Rig, a path or the name of a shipped one"):
+        handeye.evaluate(5, motions)

@@ -10,7 +10,9 @@ use crate::errors::{raise, unusable};
 use handeye::Error;
 use handeye::chain::JointKind;
 use handeye::rig::{self, Model, catalog};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+use std::ops::Deref;
 use std::path::PathBuf;
 
 /// A robot arm, the cameras that watch it and the features that they track: a rig file in memory.
@@ -53,6 +55,36 @@ impl Rig {
             Err(error) => return Err(raise(error)),
         }
         Ok(())
+    }
+}
+
+/// A rig, or the name or path by which [`Rig::load`] finds one.
+pub enum AnyRig<'py> {
+    Loaded(PyRef<'py, Rig>),
+    Named(Box<Rig>),
+}
+
+impl Deref for AnyRig<'_> {
+    type Target = Rig;
+
+    fn deref(&self) -> &Rig {
+        match self {
+            AnyRig::Loaded(rig) => rig,
+            AnyRig::Named(rig) => rig,
+        }
+    }
+}
+
+impl<'py> FromPyObject<'_, 'py> for AnyRig<'py> {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(rig) = object.cast::<Rig>() {
+            return Ok(AnyRig::Loaded(rig.try_borrow()?));
+        }
+        let path = object.extract::<PathBuf>();
+        let path = path.map_err(|_| PyTypeError::new_err("a rig is a handeye.Rig, a path or the name of a shipped one"))?;
+        Rig::load(path).map(|rig| AnyRig::Named(Box::new(rig)))
     }
 }
 

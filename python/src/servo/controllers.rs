@@ -4,7 +4,7 @@ use super::limits::Limit;
 use super::step::read;
 use crate::arrays::{Floats, vector};
 use crate::errors::{raise, unusable};
-use crate::rig::{Rig, bounds};
+use crate::rig::{AnyRig, Rig, bounds};
 use crate::sight::Layout;
 use handeye::infer::Sighting;
 use handeye::rig::{self, Joint, Limits};
@@ -146,10 +146,10 @@ pub struct ModelBased;
 impl ModelBased {
     #[new]
     #[pyo3(signature = (rig, *, takes = "joint-deltas"))]
-    fn new(rig: &Rig, takes: &str) -> PyResult<PyClassInitializer<Self>> {
+    fn new(rig: AnyRig<'_>, takes: &str) -> PyResult<PyClassInitializer<Self>> {
         let mut inner = servo::ModelBased::new(&rig.inner).map_err(raise)?;
         inner.takes = takes_of(takes)?;
-        Ok(new(ModelBased, Controller::of(rig, Kind::ModelBased(inner))))
+        Ok(new(ModelBased, Controller::of(&rig, Kind::ModelBased(inner))))
     }
 
     /// Joints that were inferred last [rad or m], shape (n_joints,); ``None`` before the first decision.
@@ -179,10 +179,10 @@ pub struct ModelBasedTip;
 impl ModelBasedTip {
     #[new]
     #[pyo3(signature = (rig, *, takes = "pose-deltas", speed = [f64::INFINITY; 2]))]
-    fn new(rig: &Rig, takes: &str, speed: [f64; 2]) -> PyResult<PyClassInitializer<Self>> {
+    fn new(rig: AnyRig<'_>, takes: &str, speed: [f64; 2]) -> PyResult<PyClassInitializer<Self>> {
         let mut inner = servo::ModelBasedTip::new(&rig.inner).map_err(raise)?;
         (inner.takes, inner.speed) = (takes_of(takes)?, speed);
-        Ok(new(ModelBasedTip, Controller::of(rig, Kind::ModelBasedTip(inner))))
+        Ok(new(ModelBasedTip, Controller::of(&rig, Kind::ModelBasedTip(inner))))
     }
 }
 
@@ -215,7 +215,7 @@ impl ImageBased {
     #[new]
     #[pyo3(signature = (rig, *, matrix = "mean", gain = GainArgument::Constant(1.0), infer_joints = false, takes = "joint-deltas"))]
     fn new(
-        rig: &Rig,
+        rig: AnyRig<'_>,
         matrix: &str,
         gain: GainArgument,
         infer_joints: bool,
@@ -225,7 +225,7 @@ impl ImageBased {
             ImageSettings { matrix: matrix_of(matrix)?, gain: gain.into(), infer_joints, ..ImageSettings::default() };
         let mut inner = servo::ImageBased::new(&rig.inner, settings).map_err(raise)?;
         inner.takes = takes_of(takes)?;
-        Ok(new(ImageBased, Controller::of(rig, Kind::ImageBased(inner))))
+        Ok(new(ImageBased, Controller::of(&rig, Kind::ImageBased(inner))))
     }
 }
 
@@ -241,7 +241,7 @@ impl PoseBased {
     #[pyo3(signature = (rig, *, matrix = "mean", gain = GainArgument::Constant(1.0), infer_joints = false, xyz_sd = 1e-3, rot_sd = 5e-3,
         takes = "joint-deltas"))]
     fn new(
-        rig: &Rig,
+        rig: AnyRig<'_>,
         matrix: &str,
         gain: GainArgument,
         infer_joints: bool,
@@ -252,7 +252,7 @@ impl PoseBased {
         let settings = PoseSettings { matrix: matrix_of(matrix)?, gain: gain.into(), infer_joints, xyz_sd, rot_sd };
         let mut inner = servo::PoseBased::new(&rig.inner, settings).map_err(raise)?;
         inner.takes = takes_of(takes)?;
-        Ok(new(PoseBased, Controller::of(rig, Kind::PoseBased(inner))))
+        Ok(new(PoseBased, Controller::of(&rig, Kind::PoseBased(inner))))
     }
 }
 
@@ -306,11 +306,11 @@ impl UncalibratedJoints {
     /// Begins with a complete rig that may be outdated: a camera may have been moved, a tool exchanged.
     #[staticmethod]
     #[pyo3(signature = (rig, *, sd_px = 0.5, gain = None, takes = "joint-deltas"))]
-    fn with_rig(py: Python<'_>, rig: &Rig, sd_px: f64, gain: Option<f64>, takes: &str) -> PyResult<Py<Self>> {
+    fn with_rig(py: Python<'_>, rig: AnyRig<'_>, sd_px: f64, gain: Option<f64>, takes: &str) -> PyResult<Py<Self>> {
         let settings = settings(Settings::with_rig(), gain, None);
         let mut inner = servo::UncalibratedJoints::with_rig(&rig.inner, sd_px, settings).map_err(raise)?;
         inner.takes = takes_of(takes)?;
-        let base = Controller::of(rig, Kind::UncalibratedJoints(Box::new(inner)));
+        let base = Controller::of(&rig, Kind::UncalibratedJoints(Box::new(inner)));
         Py::new(py, new(UncalibratedJoints, base))
     }
 }

@@ -2,7 +2,7 @@
 use super::tasks::positive;
 use crate::arrays::{Floats, pose, three};
 use crate::errors::unusable;
-use crate::rig::Rig;
+use crate::rig::{AnyRig, Rig};
 use crate::sight::Layout;
 use handeye::servo::limits::{self, Guide};
 use handeye::servo::{Arm, Configuration, LimitRows};
@@ -72,13 +72,13 @@ impl InImage {
     #[new]
     #[pyo3(signature = (rig, camera, *, features = None, margin = 10.0, strength = 10.0))]
     fn new(
-        rig: &Rig,
+        rig: AnyRig<'_>,
         camera: &str,
         features: Option<Vec<String>>,
         margin: f64,
         strength: f64,
     ) -> PyResult<PyClassInitializer<Self>> {
-        let (camera, features) = named(rig, camera, features)?;
+        let (camera, features) = named(&rig, camera, features)?;
         if rig.inner.cameras[camera].size.is_none() {
             return Err(unusable(format!(
                 "camera `{}`: the rig does not say how large its images are",
@@ -100,13 +100,13 @@ impl PixelSpeed {
     #[new]
     #[pyo3(signature = (rig, camera, speed, *, features = None, strength = 10.0))]
     fn new(
-        rig: &Rig,
+        rig: AnyRig<'_>,
         camera: &str,
         speed: f64,
         features: Option<Vec<String>>,
         strength: f64,
     ) -> PyResult<PyClassInitializer<Self>> {
-        let (camera, features) = named(rig, camera, features)?;
+        let (camera, features) = named(&rig, camera, features)?;
         let (speed, strength) = (positive("speed", speed)?, positive("strength", strength)?);
         Ok(new(PixelSpeed, Kind::PixelSpeed(limits::PixelSpeed { camera, features, speed, strength })))
     }

@@ -1,7 +1,7 @@
 //! How far a learned rig may be off.
 use crate::arrays::{Floats, NewArray, array, list};
 use crate::errors::raise;
-use crate::rig::Rig;
+use crate::rig::AnyRig;
 use crate::sight::Layout;
 use handeye::{rig, servo};
 use pyo3::prelude::*;
@@ -19,7 +19,7 @@ pub struct PredictionBounds {
 impl PredictionBounds {
     /// rig: one that was learned.
     #[new]
-    fn new(rig: &Rig) -> PyResult<Self> {
+    fn new(rig: AnyRig<'_>) -> PyResult<Self> {
         let inner = servo::PredictionBounds::new(&rig.inner).map_err(raise)?;
         Ok(PredictionBounds { inner, layout: Layout::of(&rig.inner), rig: Arc::new(rig.inner.clone()) })
     }

@@ -4,7 +4,7 @@ use super::limits::Limit;
 use super::tasks::Task;
 use crate::arrays::{Floats, NewArray, array, list, vector};
 use crate::errors::{raise, unusable};
-use crate::rig::Rig;
+use crate::rig::AnyRig;
 use handeye::rig;
 use handeye::servo::{self, Arm, Configuration};
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
@@ -51,7 +51,7 @@ impl Stepper {
     /// damping: share of the squared errors by which steps are damped, (1 rad or 1 m)⁻²; 0 takes whole Gauss-Newton steps.
     #[new]
     #[pyo3(signature = (rig, *, damping = 1e-3))]
-    fn new(rig: &Rig, damping: f64) -> PyResult<Self> {
+    fn new(rig: AnyRig<'_>, damping: f64) -> PyResult<Self> {
         let arm = Arm::new(&rig.inner).map_err(raise)?;
         let velocity = vec![0.0; arm.joints()];
         let (inner, rig) = (servo::Stepper::new(damping), Arc::new(rig.inner.clone()));

@@ -1,7 +1,7 @@
 //! Tasks: where a motion shall lead.
 use crate::arrays::{Floats, fixed, list, pose, three};
 use crate::errors::unusable;
-use crate::rig::Rig;
+use crate::rig::AnyRig;
 use crate::sight::Layout;
 use handeye::servo::tasks::{self, TipMotion};
 use handeye::servo::{Arm, Configuration, TaskRows};
@@ -56,7 +56,7 @@ impl ImagePoints {
     #[new]
     #[pyo3(signature = (rig, targets, *, seen = None, sd = 1.0))]
     fn new(
-        rig: &Rig,
+        rig: AnyRig<'_>,
         targets: &Bound<'_, PyDict>,
         seen: Option<&Bound<'_, PyDict>>,
         sd: f64,

@@ -19,8 +19,8 @@ const LEAST_FALL: f64 = 0.1;
 /// Exploring anew has to pay: what is left falls below this share of what was left before, or it is not done again.
 const PAYS: f64 = 0.5;
 
-/// Noise alone leaves more than this many standard deviations of its χ² above the mean in 1 of 1,000.
-const BEYOND_NOISE: f64 = 3.0;
+/// Errors below this many standard deviations, root mean square, are left: exploring would disturb more than it mends.
+const WORTH: f64 = 4.0;
 
 impl Default for Stall {
     fn default() -> Self {
@@ -39,8 +39,7 @@ impl Stall {
         }
         self.steps += 1;
         self.noise += noise;
-        let m = rows as f64;
-        let by_noise = (m + BEYOND_NOISE * (2.0 * m).sqrt()) * f64::max(1.0, self.noise / self.steps as f64);
+        let by_noise = WORTH * WORTH * rows as f64 * f64::max(1.0, self.noise / self.steps as f64);
         self.steps > STEPS && left > by_noise && left < PAYS * self.explored_at
     }
 
