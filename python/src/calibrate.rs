@@ -307,6 +307,15 @@ pub struct TipDeviation {
     metric: bool,
 }
 
+#[pymethods]
+impl TipDeviation {
+    fn __repr__(&self) -> String {
+        let length = |length| if self.metric { format!("{:.3} mm", 1e3 * length) } else { format!("{length:.2e}") };
+        let [median, largest, by_data] = [self.median, self.largest, self.by_data].map(length);
+        format!("<handeye.TipDeviation median {median}, largest {largest}; {by_data} by the data alone>")
+    }
+}
+
 /// Numbers of a rig that can move together without the data objecting much.
 #[pyclass(module = "handeye", frozen, get_all)]
 pub struct Weak {
@@ -320,6 +329,13 @@ pub struct Weak {
     cure: String,
     /// All of it in words.
     text: String,
+}
+
+#[pymethods]
+impl Weak {
+    fn __repr__(&self) -> String {
+        format!("<handeye.Weak {}>", self.text)
+    }
 }
 
 /// What leaving out a sample would change, and how well it fits.
@@ -337,6 +353,15 @@ pub struct Influence {
     misfit: f64,
 }
 
+#[pymethods]
+impl Influence {
+    fn __repr__(&self) -> String {
+        let Influence { sample, tip, misfit, .. } = self;
+        let tip = tip.map_or(String::new(), |tip| format!("moves the tip by {tip:.2e}, "));
+        format!("<handeye.Influence of sample {sample}: {tip}misfit {misfit:.2}>")
+    }
+}
+
 /// What was learned from targets.
 #[pyclass(module = "handeye", frozen, get_all)]
 pub struct TargetReport {
@@ -350,4 +375,12 @@ pub struct TargetReport {
     scale: Option<(f64, f64)>,
     /// Closed forms that are far from what was learned: name, angle [rad], distance [m].
     disagreements: Vec<(String, f64, f64)>,
+}
+
+#[pymethods]
+impl TargetReport {
+    fn __repr__(&self) -> String {
+        let [mm, degrees] = [1e3 * self.rms_xyz, self.rms_rot.to_degrees()];
+        format!("<handeye.TargetReport {mm:.3} mm and {degrees:.4}° rms>")
+    }
 }

@@ -164,3 +164,10 @@ def test_an_evaluation_has_a_page_too(learned, fresh, tmp_path):
     judged.report(tmp_path / "page.html", title="Fresh <samples>")
     page = (tmp_path / "page.html").read_text()
     assert page == judged.html("Fresh <samples>") and "Fresh &lt;samples&gt;" in page
+
+
+def test_what_is_told_shows_itself_in_words(motions):
+    learned = handeye.calibrate(motions[:20], "ur5", influence=True)
+    assert f"{1e3 * learned.tip.by_data:.3f} mm by the data alone" in repr(learned.tip)
+    for one in (*learned.weak, *learned.influence, *learned.stages):
+        assert " at 0x" not in repr(one) and len(repr(one)) > 30
