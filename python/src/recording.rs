@@ -130,7 +130,8 @@ impl Recording {
             Some("motions") => Actions::Motions,
             Some(other) => return Err(unusable(format!("actions: `{other}` is neither targets nor motions"))),
         };
-        let names = |rig: &AnyRig<'_>| rig.inner.robot.joints.iter().map(|joint| joint.name.clone()).collect::<Vec<String>>();
+        let names =
+            |rig: &AnyRig<'_>| rig.inner.robot.joints.iter().map(|joint| joint.name.clone()).collect::<Vec<String>>();
         let known = rig.as_ref().map(names);
         let options = OpenOptions {
             joints: joints.unwrap_or_default(),

@@ -83,7 +83,8 @@ impl<'py> FromPyObject<'_, 'py> for AnyRig<'py> {
             return Ok(AnyRig::Loaded(rig.try_borrow()?));
         }
         let path = object.extract::<PathBuf>();
-        let path = path.map_err(|_| PyTypeError::new_err("a rig is a handeye.Rig, a path or the name of a shipped one"))?;
+        let path =
+            path.map_err(|_| PyTypeError::new_err("a rig is a handeye.Rig, a path or the name of a shipped one"))?;
         Rig::load(path).map(|rig| AnyRig::Named(Box::new(rig)))
     }
 }
