@@ -1,7 +1,8 @@
 //! `handeye check`: what a rig file says, and whether a recording goes with it.
 use super::answer::Answer;
 use super::counts::Counts;
-use super::inputs::{RigInput, read_recordings, read_rig};
+use super::inputs::{RigInput, read_rig, read_with_notes};
+use super::reading::Reading;
 use super::survey::Survey;
 use super::table::Table;
 use super::words::{count, list};
@@ -26,6 +27,8 @@ pub struct Check {
     /// Recordings to hold against it
     #[arg(value_name = "REC")]
     recordings: Vec<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 impl Check {
@@ -58,10 +61,14 @@ impl Check {
             "complete": is_complete,
         });
         if !self.recordings.is_empty() {
-            let recording = read_recordings(&self.recordings, Some(&input))?;
+            let (recording, notes) = read_with_notes(&self.recordings, Some(&input), &self.reading, &[])?;
             let survey = Survey::new(rig, &recording);
             text += &format!("\n{survey}");
             json["recording"] = survey.json();
+            if !notes.is_empty() {
+                text += &format!("\nhow it was read:\n{}", lines(&notes));
+            }
+            json["notes"] = json!(notes);
             match states_in_words(rig, &recording) {
                 Ok(states) => {
                     text += &format!("\nthe robot's state:\n{}", lines(&states));

@@ -77,7 +77,16 @@ impl Recording {
                 let mut recording = Recording::read(path)?;
                 let described = recording.describe_cameras(&options.cameras);
                 described.map_err(|problem| Error::Unusable(format!("{}: {problem}", path.display())))?;
-                Ok(Opened { recording, notes: Vec::new(), images: Vec::new() })
+                let order = recording.joints.join(", ");
+                let is_ordered = recording.order_joints(&options.known_joints);
+                let note = || {
+                    let ours = recording.joints.join(", ");
+                    format!(
+                        "joints are taken by their names, in the order of the rig: {ours}; the file has them in the order {order}"
+                    )
+                };
+                let notes = is_ordered.then(note).into_iter().collect();
+                Ok(Opened { recording, notes, images: Vec::new() })
             }
             Format::Bag => bag::read(path, options, None),
             Format::Csv => table::read_csv(path, options),
