@@ -2,6 +2,7 @@
 use super::answer::Answer;
 use super::counts::Counts;
 use super::inputs::{RigInput, read_rig, read_with_notes};
+use super::progress::Bar;
 use super::reading::Reading;
 use super::survey::Survey;
 use super::table::Table;
@@ -9,8 +10,8 @@ use super::words::{count, list};
 use clap::Args;
 use handeye::Error;
 use handeye::calibrate::{Options, states_in_words};
-use handeye::doctor::{Diagnosis, Misfit, examine};
-use handeye::rig::{Camera, Model, Parent, Rig};
+use handeye::doctor::{Diagnosis, Misfit, examine_watched};
+use handeye::rig::{Camera, Model, Noise, Parent, Rig};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -32,7 +33,7 @@ pub struct Check {
 }
 
 impl Check {
-    pub fn run(&self) -> Result<Answer, Error> {
+    pub fn run(&self, is_json: bool) -> Result<Answer, Error> {
         let input = read_rig(&self.rig)?;
         let RigInput { rig, name, .. } = &input;
         let counts = Counts::new(rig);
@@ -76,8 +77,13 @@ impl Check {
                 }
                 Err(error) => text += &format!("\nthe robot's state is not known: {error}\n"),
             }
-            let diagnosis = examine(rig, &recording, &Options::default());
-            text += &format!("\n{}", tell(&diagnosis));
+            let bar = Bar::new(is_json);
+            let diagnosis = examine_watched(rig, &recording, &Options::default(), &mut |hypothesis, progress| {
+                let _ = bar.show(&format!("{hypothesis}: "), progress);
+            });
+            drop(bar);
+            text += &format!("\n{}", tell(&diagnosis, &rig.noise));
+            json["misfit_over_noise"] = json!(over_noise(&diagnosis, &rig.noise));
             json["scores"] = diagnosis
                 .scores
                 .iter()
@@ -101,7 +107,15 @@ fn lines(lines: &[String]) -> String {
     lines.iter().map(|line| format!("  {line}\n")).collect()
 }
 
-fn tell(diagnosis: &Diagnosis) -> String {
+/// Beyond so many times what noise alone would leave, a misfit is a mistake or a rig that is not this one.
+const EXPLAINED: f64 = 3.0;
+
+/// The misfit of the data as recorded, in relation to noise.
+fn over_noise(diagnosis: &Diagnosis, noise: &Noise) -> Option<f64> {
+    diagnosis.scores.first()?.misfit?.over_noise(noise)
+}
+
+fn tell(diagnosis: &Diagnosis, noise: &Noise) -> String {
     let mut table = Table::new(&["if", "median misfit"]);
     for score in &diagnosis.scores {
         let cell = score.misfit.map_or_else(|| "no fit".to_owned(), |misfit| misfit.to_string());
@@ -111,8 +125,23 @@ fn tell(diagnosis: &Diagnosis) -> String {
     if let Some(reason) = &diagnosis.unsolved {
         text += &format!("\nnothing can be learned from the data as recorded: {reason}\n");
     }
+    let ratio = over_noise(diagnosis, noise);
+    let misfit = diagnosis.scores.first().and_then(|score| score.misfit);
+    let expected = misfit.and_then(|misfit| misfit.of_noise(noise));
+    if let (Some(misfit), Some(expected), Some(ratio)) = (misfit, expected, ratio) {
+        text += &if ratio > EXPLAINED {
+            format!(
+                "\nas recorded it does not fit: {misfit} is {ratio:.0} times the {expected} that the rig's [noise] leaves\n"
+            )
+        } else {
+            format!("\nas recorded it fits: {misfit}, where the rig's [noise] leaves {expected}\n")
+        };
+    }
     if diagnosis.findings.is_empty() && diagnosis.unsolved.is_none() {
         text += "\nno mistake in units, pairing, axes or sides was found\n";
+        if ratio.is_some_and(|ratio| ratio > EXPLAINED) {
+            text += "what does not fit may be the rig: another robot, numbers held that are wrong, a target that slipped, a camera that moved\n";
+        }
     }
     for finding in &diagnosis.findings {
         text += &format!("\n  {}: {}\n", finding.what, finding.change);
