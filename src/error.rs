@@ -1,7 +1,7 @@
 //! Everything that can go wrong, with its place and what would do.
 mod spelling;
 
-pub(crate) use spelling::suggestion;
+pub(crate) use spelling::{shipped, suggestion};
 use std::path::{Path, PathBuf};
 
 /// Why a piece of work was not done. Messages are lower case, without a full stop, and name the place first.

@@ -5,6 +5,7 @@ use super::folds::Folds;
 use super::inputs::{check_output, is_same, read_recordings_with_new, read_rig, write_output};
 use super::noise;
 use super::progress::Bar;
+use super::reading::Reading;
 use super::trust;
 use super::words::{cameras_json, count, duration, error_table, points_json};
 use clap::Args;
@@ -68,12 +69,14 @@ pub struct Calibrate {
     /// Threads to work on; the result does not depend on it [default: as many as there are cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 impl Calibrate {
     pub fn run(&self, is_json: bool) -> Result<Answer, Error> {
         let input = self.rig.as_deref().map(read_rig).transpose()?;
-        let recording = read_recordings_with_new(&self.recordings, input.as_ref(), &self.relearn)?;
+        let recording = read_recordings_with_new(&self.recordings, input.as_ref(), &self.reading, &self.relearn)?;
         check_output(&self.output, &self.recordings)?;
         if let Some(page) = &self.report {
             // Where the rig is learned into its own file, that is another output.

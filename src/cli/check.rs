@@ -1,15 +1,17 @@
 //! `handeye check`: what a rig file says, and whether a recording goes with it.
 use super::answer::Answer;
 use super::counts::Counts;
-use super::inputs::{RigInput, read_recordings, read_rig};
+use super::inputs::{RigInput, read_rig, read_with_notes};
+use super::progress::Bar;
+use super::reading::Reading;
 use super::survey::Survey;
 use super::table::Table;
 use super::words::{count, list};
 use clap::Args;
 use handeye::Error;
 use handeye::calibrate::{Options, states_in_words};
-use handeye::doctor::{Diagnosis, Misfit, examine};
-use handeye::rig::{Camera, Model, Parent, Rig};
+use handeye::doctor::{Diagnosis, Misfit, examine_watched};
+use handeye::rig::{Camera, Model, Noise, Parent, Rig};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -26,10 +28,12 @@ pub struct Check {
     /// Recordings to hold against it
     #[arg(value_name = "REC")]
     recordings: Vec<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 impl Check {
-    pub fn run(&self) -> Result<Answer, Error> {
+    pub fn run(&self, is_json: bool) -> Result<Answer, Error> {
         let input = read_rig(&self.rig)?;
         let RigInput { rig, name, .. } = &input;
         let counts = Counts::new(rig);
@@ -58,10 +62,14 @@ impl Check {
             "complete": is_complete,
         });
         if !self.recordings.is_empty() {
-            let recording = read_recordings(&self.recordings, Some(&input))?;
+            let (recording, notes) = read_with_notes(&self.recordings, Some(&input), &self.reading, &[])?;
             let survey = Survey::new(rig, &recording);
             text += &format!("\n{survey}");
             json["recording"] = survey.json();
+            if !notes.is_empty() {
+                text += &format!("\nhow it was read:\n{}", lines(&notes));
+            }
+            json["notes"] = json!(notes);
             match states_in_words(rig, &recording) {
                 Ok(states) => {
                     text += &format!("\nthe robot's state:\n{}", lines(&states));
@@ -69,8 +77,13 @@ impl Check {
                 }
                 Err(error) => text += &format!("\nthe robot's state is not known: {error}\n"),
             }
-            let diagnosis = examine(rig, &recording, &Options::default());
-            text += &format!("\n{}", tell(&diagnosis));
+            let bar = Bar::new(is_json);
+            let diagnosis = examine_watched(rig, &recording, &Options::default(), &mut |hypothesis, progress| {
+                let _ = bar.show(&format!("{hypothesis}: "), progress);
+            });
+            drop(bar);
+            text += &format!("\n{}", tell(&diagnosis, &rig.noise));
+            json["misfit_over_noise"] = json!(over_noise(&diagnosis, &rig.noise));
             json["scores"] = diagnosis
                 .scores
                 .iter()
@@ -94,7 +107,15 @@ fn lines(lines: &[String]) -> String {
     lines.iter().map(|line| format!("  {line}\n")).collect()
 }
 
-fn tell(diagnosis: &Diagnosis) -> String {
+/// Beyond so many times what noise alone would leave, a misfit is a mistake or a rig that is not this one.
+const EXPLAINED: f64 = 3.0;
+
+/// The misfit of the data as recorded, in relation to noise.
+fn over_noise(diagnosis: &Diagnosis, noise: &Noise) -> Option<f64> {
+    diagnosis.scores.first()?.misfit?.over_noise(noise)
+}
+
+fn tell(diagnosis: &Diagnosis, noise: &Noise) -> String {
     let mut table = Table::new(&["if", "median misfit"]);
     for score in &diagnosis.scores {
         let cell = score.misfit.map_or_else(|| "no fit".to_owned(), |misfit| misfit.to_string());
@@ -104,8 +125,23 @@ fn tell(diagnosis: &Diagnosis) -> String {
     if let Some(reason) = &diagnosis.unsolved {
         text += &format!("\nnothing can be learned from the data as recorded: {reason}\n");
     }
+    let ratio = over_noise(diagnosis, noise);
+    let misfit = diagnosis.scores.first().and_then(|score| score.misfit);
+    let expected = misfit.and_then(|misfit| misfit.of_noise(noise));
+    if let (Some(misfit), Some(expected), Some(ratio)) = (misfit, expected, ratio) {
+        text += &if ratio > EXPLAINED {
+            format!(
+                "\nas recorded it does not fit: {misfit} is {ratio:.0} times the {expected} that the rig's [noise] leaves\n"
+            )
+        } else {
+            format!("\nas recorded it fits: {misfit}, where the rig's [noise] leaves {expected}\n")
+        };
+    }
     if diagnosis.findings.is_empty() && diagnosis.unsolved.is_none() {
         text += "\nno mistake in units, pairing, axes or sides was found\n";
+        if ratio.is_some_and(|ratio| ratio > EXPLAINED) {
+            text += "what does not fit may be the rig: another robot, numbers held that are wrong, a target that slipped, a camera that moved\n";
+        }
     }
     for finding in &diagnosis.findings {
         text += &format!("\n  {}: {}\n", finding.what, finding.change);

@@ -10,9 +10,10 @@ use std::path::PathBuf;
 
 /// Write a ROS 2 bag, a CSV file or a LeRobot dataset as a recording (JSON Lines)
 ///
-/// Other commands read these files themselves, by the endings of their names, with the defaults of this one.
+/// Other commands read these files themselves, by the endings of their names, and calibrate, check, evaluate, monitor and suggest take the same
+/// options.
 ///
-/// Bags (.mcap): features are the corners of AprilTags (apriltag_msgs/AprilTagDetectionArray) and the centres of Detection2D (vision_msgs);
+/// Bags (.mcap, or the folder that ros2 bag record makes): features are the corners of AprilTags (apriltag_msgs/AprilTagDetectionArray) and the centres of Detection2D (vision_msgs);
 /// joints come from sensor_msgs/JointState, intrinsics from sensor_msgs/CameraInfo, tip poses from geometry_msgs/PoseStamped or TF. States
 /// are interpolated to the images' stamps.
 ///
@@ -29,7 +30,7 @@ Examples:
   handeye convert motions.csv --joints q1,q2,q3 --degrees --camera left=640x480 -o motions.jsonl
   handeye convert so100_dataset --degrees --joints shoulder_pan,shoulder_lift,elbow_flex,wrist_flex,wrist_roll -o motions.jsonl")]
 pub struct Convert {
-    /// A bag (.mcap), a table (.csv, .tsv, .parquet) or the folder of a LeRobot dataset
+    /// A bag (.mcap, or its folder), a table (.csv, .tsv, .parquet) or the folder of a LeRobot dataset
     #[arg(value_name = "FILE")]
     input: PathBuf,
     #[command(flatten)]

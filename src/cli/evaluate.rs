@@ -1,6 +1,7 @@
 //! `handeye evaluate`: how well a rig predicts a recording.
 use super::answer::Answer;
 use super::inputs::{check_output, read_recordings, read_rig, write_output};
+use super::reading::Reading;
 use super::words::{cameras_json, count, error_table, errors_json, mm, px};
 use clap::Args;
 use handeye::Error;
@@ -34,12 +35,14 @@ pub struct Evaluate {
     /// Also write a page to read: residuals of every camera, coverage, worst samples, a view that can be turned
     #[arg(long, value_name = "HTML")]
     report: Option<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 impl Evaluate {
     pub fn run(&self) -> Result<Answer, Error> {
         let input = read_rig(&self.rig)?;
-        let recording = read_recordings(&self.recordings, Some(&input))?;
+        let recording = read_recordings(&self.recordings, Some(&input), &self.reading)?;
         if let Some(page) = &self.report {
             let inputs: Vec<PathBuf> = self.recordings.iter().chain([&self.rig]).cloned().collect();
             check_output(page, &inputs)?;

@@ -1,9 +1,9 @@
 //! `handeye export`: a rig as a file that others read.
-use super::answer::Answer;
+use super::answer::{Answer, remark};
 use super::inputs::{RigInput, check_output, read_rig, write_output};
 use clap::{Args, ValueEnum};
 use handeye::Error;
-use handeye::export::{to_camchain, to_intrinsics, to_static_transforms, to_tf, to_urdf};
+use handeye::export::{note_on_unit, to_camchain, to_intrinsics, to_static_transforms, to_tf, to_urdf};
 use handeye::intrinsics::{Intrinsics, to_camera_info, to_opencv};
 use handeye::rig::{Rig, read_text};
 use serde_json::json;
@@ -61,8 +61,12 @@ impl Export {
             check_output(output, &inputs)?;
         }
         let text = self.text(&input)?;
-        let mut json =
-            json!({ "rig": input.name, "output": self.output.as_ref().map(|path| path.display().to_string()) });
+        // Calibration files of single cameras have no lengths, and a rig file says itself what its lengths are.
+        let has_none = matches!(self.to, Format::Dh | Format::CameraInfo | Format::Opencv);
+        let note = note_on_unit(&input.rig).filter(|_| !has_none);
+        note.iter().for_each(|note| remark(&format!("{}: {note}", input.name)));
+        let output = self.output.as_ref().map(|path| path.display().to_string());
+        let mut json = json!({ "rig": input.name, "output": output, "note": note });
         let Some(output) = &self.output else {
             json["text"] = json!(text);
             return Ok(Answer::new(text, json));

@@ -1,6 +1,7 @@
 //! `handeye infer`: joints and tip poses from the pixels of a recording.
 use super::answer::Answer;
 use super::inputs::{read_recordings, read_rig};
+use super::reading::Reading;
 use super::words::count;
 use clap::Args;
 use handeye::Error;
@@ -43,7 +44,7 @@ pub struct Infer {
 impl Infer {
     pub fn run(&self) -> Result<Answer, Error> {
         let input = read_rig(&self.rig)?;
-        let recording = read_recordings(&self.recordings, Some(&input))?;
+        let recording = read_recordings(&self.recordings, Some(&input), &Reading::default())?;
         if self.readings && input.rig.noise.joints <= 0.0 {
             let name = &input.name;
             return Err(Error::Unusable(format!(

@@ -1,10 +1,17 @@
 //! Reading a rig and the recordings that go with it, and seeing in time that an output can be written.
 use super::answer::remark;
+use super::reading::Reading;
+use crate::error::shipped;
+use crate::recording::is_in_another_order;
 use handeye::Error;
-use handeye::recording::{OpenOptions, Opened, RecordedCamera, Recording, Sample};
+use handeye::recording::{Format, OpenOptions, Opened, RecordedCamera, Recording, Sample};
 use handeye::rig::{Rig, catalog, matches, replace_file};
-use std::io;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+
+/// How far into a file the mark of a recording is looked for [bytes].
+const HEADER: u64 = 1 << 12;
 
 /// A rig that was named on the command line.
 pub struct RigInput {
@@ -23,30 +30,85 @@ pub fn read_rig(argument: &Path) -> Result<RigInput, Error> {
     {
         return Ok(RigInput { rig: catalog::rig(&name)?, text: (*text).to_owned(), name });
     }
+    if argument.try_exists().is_ok_and(|exists| !exists) {
+        return Err(unknown(argument, "rig", catalog::ALL));
+    }
+    if is_recording(argument) {
+        return Err(Error::Unusable(format!(
+            "{name}: that is a recording, and a rig is expected here; the rig comes first: handeye check RIG RECORDING (evaluate, \
+             infer and monitor likewise)"
+        )));
+    }
     let (rig, text) = Rig::read_with_text(argument)?;
     Ok(RigInput { rig, text, name })
 }
 
-/// Reads recordings as one, bags and tables with default options, and refuses what the rig cannot be the rig of.
-pub fn read_recordings(paths: &[PathBuf], rig: Option<&RigInput>) -> Result<Recording, Error> {
-    read_recordings_with_new(paths, rig, &[])
+/// True where the file's ending or its first line says so.
+fn is_recording(path: &Path) -> bool {
+    if path.is_file() && Format::of(path) == Format::JsonLines {
+        let mut start = Vec::new();
+        // What cannot be read is told by whoever reads it.
+        let _ = File::open(path).and_then(|file| file.take(HEADER).read_to_end(&mut start));
+        let header = String::from_utf8_lossy(&start);
+        return header.trim_start().starts_with('{') && header.contains("\"handeye-recording\"");
+    }
+    match Format::of(path) {
+        Format::JsonLines => false,
+        Format::LeRobot => path.join("meta").is_dir(),
+        Format::Bag | Format::Csv | Format::Parquet => true,
+    }
+}
+
+/// What is neither a file nor the name of something that is shipped.
+pub fn unknown(argument: &Path, what: &str, known: &[(&str, &str)]) -> Error {
+    let meant = argument.file_stem().unwrap_or_default().to_string_lossy();
+    let known = shipped(&meant, known.iter().map(|(name, _)| *name));
+    Error::Unusable(format!("{}: neither a {what} file nor a shipped {what} {known}", argument.display()))
+}
+
+/// Reads recordings as one, and refuses what the rig cannot be the rig of.
+pub fn read_recordings(paths: &[PathBuf], rig: Option<&RigInput>, reading: &Reading) -> Result<Recording, Error> {
+    read_recordings_with_new(paths, rig, reading, &[])
 }
 
 /// The same where parameters that match any of `new` may be of cameras that the rig does not have yet.
-pub fn read_recordings_with_new(paths: &[PathBuf], rig: Option<&RigInput>, new: &[String]) -> Result<Recording, Error> {
+pub fn read_recordings_with_new(
+    paths: &[PathBuf],
+    rig: Option<&RigInput>,
+    reading: &Reading,
+    new: &[String],
+) -> Result<Recording, Error> {
+    let (recording, notes) = read_with_notes(paths, rig, reading, new)?;
+    notes.iter().for_each(|note| remark(note));
+    Ok(recording)
+}
+
+/// The same with what has to be said of how they were read.
+pub fn read_with_notes(
+    paths: &[PathBuf],
+    rig: Option<&RigInput>,
+    reading: &Reading,
+    new: &[String],
+) -> Result<(Recording, Vec<String>), Error> {
+    reading.refuse_without_effect(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
     let known_joints =
         rig.map_or_else(Vec::new, |input| input.rig.robot.joints.iter().map(|joint| joint.name.clone()).collect());
-    let options = OpenOptions { known_joints, ..OpenOptions::default() };
+    let options = OpenOptions { known_joints, ..reading.options()? };
+    let mut all_notes = Vec::new();
     let recording = Recording::read_all_with(paths, &mut |path| {
+        if path.extension().is_some_and(|extension| extension == "toml") && path.is_file() {
+            let problem = format!("{}: that is a rig file, and a recording is expected here", path.display());
+            return Err(Error::Unusable(problem));
+        }
         let Opened { recording, notes, .. } = Recording::open_with(path, &options)?;
-        notes.iter().for_each(|note| remark(&format!("{}: {note}", path.display())));
+        all_notes.extend(notes.iter().map(|note| format!("{}: {note}", path.display())));
         Ok(recording)
     })?;
     if let Some(problem) = rig.and_then(|rig| mismatch(rig, &recording, new)) {
         let file = paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
         return Err(Error::Malformed { file, line: 1, column: 1, problem });
     }
-    Ok(recording)
+    Ok((recording, all_notes))
 }
 
 /// Why a recording is not one of this rig.
@@ -55,6 +117,11 @@ fn mismatch(input: &RigInput, recording: &Recording, new: &[String]) -> Option<S
     let (ours, theirs) = (rig.robot.joints.len(), recording.joints.len());
     if ours != theirs && ours > 0 {
         return Some(format!("the recording has {theirs} joints, the rig {name} has {ours}"));
+    }
+    let names: Vec<String> = rig.robot.joints.iter().map(|joint| joint.name.clone()).collect();
+    if is_in_another_order(&recording.joints, &names) {
+        let (theirs, ours) = (recording.joints.join(", "), names.join(", "));
+        return Some(format!("the joints are in the order {theirs}, those of the rig {name} in the order {ours}"));
     }
     let is_used = |index: usize| {
         let index = index as u32;
@@ -99,13 +166,13 @@ pub fn is_same(one: &Path, other: &Path) -> bool {
 
 /// Fails where an output could not be written, or would replace one of the inputs: before the work, not after it.
 pub fn check_output(path: &Path, inputs: &[PathBuf]) -> Result<(), Error> {
-    let fails = |kind: io::ErrorKind| Err(Error::Io { path: path.to_owned(), source: kind.into() });
     if path.is_dir() {
-        return fails(io::ErrorKind::IsADirectory);
+        return Err(Error::Io { path: path.to_owned(), source: io::ErrorKind::IsADirectory.into() });
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !folder.is_dir() {
-        return fails(io::ErrorKind::NotFound);
+        let problem = format!("{}: there is no folder `{}`", path.display(), folder.display());
+        return Err(Error::Unusable(problem));
     }
     let Ok(output) = path.canonicalize() else { return Ok(()) };
     match inputs.iter().find(|input| input.canonicalize().is_ok_and(|input| input == output)) {

@@ -99,7 +99,7 @@ impl Cli {
     fn run(&self) -> Result<Answer, Error> {
         match &self.command {
             Command::Demo(demo) => demo.run(self.json),
-            Command::Check(check) => check.run(),
+            Command::Check(check) => check.run(self.json),
             Command::Simulate(simulate) => simulate.run(),
             Command::Calibrate(calibrate) => calibrate.run(self.json),
             Command::Evaluate(evaluate) => evaluate.run(),

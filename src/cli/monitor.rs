@@ -1,6 +1,7 @@
 //! `handeye monitor`: watches a learned rig over recordings, and says what of it moved.
 use super::answer::Answer;
 use super::inputs::{check_output, read_recordings, read_rig};
+use super::reading::Reading;
 use super::words::count;
 use clap::Args;
 use handeye::Error;
@@ -30,12 +31,14 @@ pub struct MonitorCommand {
     /// Largest probability of an alarm at a sample of an unchanged rig
     #[arg(long, value_name = "P", default_value_t = MonitorOptions::default().false_alarm_rate)]
     false_alarms: f64,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 impl MonitorCommand {
     pub fn run(&self) -> Result<Answer, Error> {
         let input = read_rig(&self.rig)?;
-        let recording = read_recordings(&self.recordings, Some(&input))?;
+        let recording = read_recordings(&self.recordings, Some(&input), &self.reading)?;
         if let Some(output) = &self.output {
             check_output(output, &self.recordings)?;
         }

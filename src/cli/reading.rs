@@ -1,11 +1,11 @@
-//! What of bags and tables is meant, for the commands that are told.
+//! What of bags and tables is meant, for the commands that read recordings.
 use super::inputs::read_camera;
 use clap::{Args, ValueEnum};
 use handeye::Error;
 use handeye::recording::{Actions, Angles, BagOptions, Format, OpenOptions, TableOptions};
 use std::path::Path;
 
-#[derive(Args)]
+#[derive(Args, Default)]
 pub struct Reading {
     /// Names of the joints from base to tip [default: those of the first joint state, or of the columns]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
@@ -50,7 +50,7 @@ impl Reading {
     }
 }
 
-#[derive(Args)]
+#[derive(Args, Default)]
 #[command(next_help_heading = "Options of bags")]
 pub struct OfBags {
     /// The topic of joint states, where there are several
@@ -73,7 +73,7 @@ pub struct OfBags {
     join: Option<f64>,
 }
 
-#[derive(Args)]
+#[derive(Args, Default)]
 #[command(next_help_heading = "Options of tables")]
 pub struct OfTables {
     /// Take joints for degrees: these, or all

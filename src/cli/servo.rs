@@ -1,6 +1,6 @@
 //! `handeye servo`: a closed loop in simulation.
 use super::answer::Answer;
-use super::inputs::{check_output, is_same, read_rig, write_output};
+use super::inputs::{check_output, is_same, read_rig, unknown, write_output};
 use super::progress::Line;
 use super::table::Table;
 use super::words::count;
@@ -103,11 +103,7 @@ fn read_scene(argument: &Path) -> Result<Scene, Error> {
     }
     match scene::ALL.iter().find(|(known, _)| *known == name) {
         Some((_, text)) => Scene::parse(text, &format!("models/scenes/{name}.toml"), Path::new("")),
-        None => {
-            let known: Vec<&str> = scene::ALL.iter().map(|(known, _)| *known).collect();
-            let known = known.join(", ");
-            Err(Error::Unusable(format!("{name}: neither a scene file nor a shipped scene (known: {known})")))
-        }
+        None => Err(unknown(argument, "scene", scene::ALL)),
     }
 }
 

@@ -1,6 +1,7 @@
 //! `handeye suggest`: where to move next.
 use super::answer::Answer;
 use super::inputs::{check_output, read_recordings, read_rig};
+use super::reading::Reading;
 use super::table::Table;
 use super::words::count;
 use clap::Args;
@@ -43,13 +44,16 @@ pub struct Suggest {
     /// A recording to write, of the joints alone: positions for a robot to visit
     #[arg(short, long, value_name = "REC")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 impl Suggest {
     pub fn run(&self) -> Result<Answer, Error> {
         let input = read_rig(&self.learned)?;
         let known = self.rig.as_deref().map(read_rig).transpose()?;
-        let recording = if self.with.is_empty() { None } else { Some(read_recordings(&self.with, Some(&input))?) };
+        let recording =
+            if self.with.is_empty() { None } else { Some(read_recordings(&self.with, Some(&input), &self.reading)?) };
         if let Some(output) = &self.output {
             let inputs = self.with.iter().chain([&self.learned]).chain(&self.rig).cloned().collect::<Vec<_>>();
             check_output(output, &inputs)?;

@@ -110,7 +110,7 @@ impl std::fmt::Display for Survey {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let with: Vec<String> =
             self.with.iter().filter(|(_, n)| *n > 0).map(|(key, n)| format!("{n} with {key}")).collect();
-        writeln!(f, "the recording fits: {} ({})\n", count(self.samples, "sample"), with.join(", "))?;
+        writeln!(f, "the recording has {} ({})\n", count(self.samples, "sample"), with.join(", "))?;
         let has_points = self.cameras.iter().any(|seen| seen.points > 0);
         let points = |cell: String| has_points.then_some(cell);
         let header = ["camera", "images", "detections"].into_iter().chain(has_points.then_some("points"));

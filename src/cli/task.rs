@@ -1,6 +1,6 @@
 //! `handeye task`: what a task in images fixes, leaves free, and where else it may end.
 use super::answer::Answer;
-use super::inputs::read_rig;
+use super::inputs::{read_rig, unknown};
 use super::words::count;
 use clap::Args;
 use handeye::Error;
@@ -60,10 +60,7 @@ fn read_task(argument: &Path) -> Result<ImageTask, Error> {
     }
     match catalog::ALL.iter().find(|(known, _)| *known == name) {
         Some((_, text)) => ImageTask::parse(text, &format!("models/tasks/{name}.toml")),
-        None => {
-            let known = catalog::ALL.iter().map(|(known, _)| *known).collect::<Vec<_>>().join(", ");
-            Err(Error::Unusable(format!("{name}: neither a task file nor a shipped task (known: {known})")))
-        }
+        None => Err(unknown(argument, "task", catalog::ALL)),
     }
 }
 

@@ -1,7 +1,7 @@
 //! What the samples themselves show, without a model.
 use super::Finding;
 use crate::chain::JointKind;
-use crate::recording::Recording;
+use crate::recording::{Recording, is_in_another_order};
 use crate::rig::Rig;
 use handeye_solvers::Pose;
 use handeye_solvers::manifold::so3;
@@ -19,16 +19,55 @@ const NOISE: f64 = 0.01;
 /// A joint that moves by less than this [rad, m] stands still.
 const STILL: f64 = 1e-3;
 
+/// What is said of readings beyond limits.
+pub(super) const LIMITS: &str = "outside the rig's limits";
+
+/// How far beyond a limit a joint may be read [rad, m]: encoders are noisy, and limits rounded.
+const BEYOND: f64 = 0.01;
+
 /// No arm reaches so far, and no target is so far away [m].
 const FAR: f64 = 20.0;
 
 /// Everything that needs no solve. `tips`: `world_from_tip` of each sample, where it is known.
 pub(super) fn findings(rig: &Rig, recording: &Recording, tips: &[Option<Pose>]) -> Vec<Finding> {
-    let mut findings = Vec::new();
+    let mut findings = outside_limits(rig, recording);
     findings.extend(repeats(recording));
     findings.extend(one_joint(recording));
     findings.extend(one_axis(tips));
     findings.extend(distances(rig, recording));
+    findings
+}
+
+/// Joints that have the names of the rig's in another order: they go by their places, so nothing that a fit says would hold.
+pub(super) fn another_order(rig: &Rig, recording: &Recording) -> Option<Finding> {
+    let names: Vec<String> = rig.robot.joints.iter().map(|joint| joint.name.clone()).collect();
+    is_in_another_order(&recording.joints, &names).then(|| Finding {
+        what: format!("the joints are in the order {}, those of the rig in another", recording.joints.join(", ")),
+        change: format!("put the readings in the rig's order, {}, or read the file with the rig", names.join(", ")),
+    })
+}
+
+/// Readings that the rig's robot could not have had.
+fn outside_limits(rig: &Rig, recording: &Recording) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for (index, joint) in rig.robot.joints.iter().enumerate() {
+        let read = recording.samples.iter().filter_map(|sample| sample.joints.as_ref()?.get(index).copied());
+        let read: Vec<f64> = read.collect();
+        let [lower, upper] =
+            [joint.limits.lower.unwrap_or(f64::NEG_INFINITY), joint.limits.upper.unwrap_or(f64::INFINITY)];
+        let n = read.iter().filter(|reading| **reading < lower - BEYOND || **reading > upper + BEYOND).count();
+        if n > 0 {
+            findings.push(Finding {
+                what: format!(
+                    "{n} of {} readings of joint `{}` are {LIMITS}, {lower:.3} to {upper:.3}",
+                    read.len(),
+                    joint.name
+                ),
+                change: "is it this robot? Take its rig, or correct the limits, or the readings' unit, zero or order"
+                    .into(),
+            });
+        }
+    }
     findings
 }
 

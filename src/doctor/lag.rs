@@ -1,4 +1,5 @@
 //! A lag between the clocks of robot and images, where samples are dense enough to interpolate joints between them.
+use super::Watch;
 use super::pixels::{learn, misfit};
 use crate::calibrate::{Options, evaluate};
 use crate::recording::{Recording, Sample};
@@ -22,11 +23,11 @@ pub(super) struct Lag {
 
 /// The lag at which a rig explains the images best, found in turns with the rig. `None` where samples are not dense in time or
 /// nothing can be learned.
-pub(super) fn find(rig: &Rig, recording: &Recording, options: &Options) -> Option<Lag> {
+pub(super) fn find(rig: &Rig, recording: &Recording, options: &Options, watch: &mut Watch<'_>) -> Option<Lag> {
     let period = period(recording)?;
     let mut lag = Lag { seconds: 0.0, recording: recording.clone() };
     for _ in 0..ROUNDS {
-        let learned = learn(rig, &lag.recording, options).ok()?;
+        let learned = learn(rig, &lag.recording, options, "a lag", watch).ok()?;
         let misfit_at = |k: i32| {
             let shifted = interpolated(recording, f64::from(k) * STEP * period);
             evaluate(&learned.rig, &shifted).map_or(f64::INFINITY, |judged| misfit(&judged.total).size())

@@ -10,11 +10,14 @@ mod undo;
 use crate::calibrate;
 use crate::chain::JointKind;
 use crate::recording::Recording;
-use crate::rig::{Model, Rig};
+use crate::rig::{Model, Noise, Rig};
 use handeye_solvers::Pose;
 
 /// An alternative is a finding where its misfit is below this share of the misfit as recorded.
 const CLEARLY_BETTER: f64 = 0.5;
+
+/// Median of the length of three errors of standard deviation 1.
+const MEDIAN_IN_SPACE: f64 = 1.538;
 
 /// A turn [rad] and a shift [m] that weigh the same.
 const TURN: f64 = 0.01;
@@ -65,16 +68,36 @@ pub struct Diagnosis {
     pub unsolved: Option<String>,
 }
 
-/// Examines a recording: units, inverted poses, orders of quaternions, pairing of rows and images, time lag, image axes,
+/// What a search is doing: the hypothesis, and how far its calibration is.
+pub type Watch<'a> = dyn FnMut(&str, &calibrate::Progress<'_>) + 'a;
+
+/// Examines a recording: order and limits of joints, units, inverted poses, orders of quaternions, pairing of rows and images, time lag, image axes,
 /// principal points, the side of the robot that cameras are on, repeated samples, rotations that are all about one axis.
 ///
 /// Targets and tip poses are compared in closed form. Pixels and points take a whole calibration per alternative, most of them only where
 /// the data as recorded are not explained to about their noise. Never fails: what could not be done is in the diagnosis.
 pub fn examine(rig: &Rig, recording: &Recording, options: &calibrate::Options) -> Diagnosis {
+    examine_watched(rig, recording, options, &mut |_, _| ())
+}
+
+/// The same where each step of its calibrations is told.
+pub fn examine_watched(
+    rig: &Rig,
+    recording: &Recording,
+    options: &calibrate::Options,
+    watch: &mut Watch<'_>,
+) -> Diagnosis {
+    if let Some(finding) = data::another_order(rig, recording) {
+        return Diagnosis { findings: vec![finding], ..Diagnosis::default() };
+    }
     let tips = tips(rig, recording, f64::to_owned);
     let mut diagnosis = Diagnosis { findings: data::findings(rig, recording, &tips), ..Diagnosis::default() };
-    let turns_freely =
-        !diagnosis.findings.iter().any(|finding| finding.what.contains("turn") || finding.what.contains("one axis"));
+    let is_of_turns = |finding: &Finding| {
+        // A joint may be called anything.
+        let is_of_limits = finding.what.contains(data::LIMITS);
+        !is_of_limits && (finding.what.contains("turn") || finding.what.contains("one axis"))
+    };
+    let turns_freely = !diagnosis.findings.iter().any(is_of_turns);
     if let Some(pairs) = poses::Pairs::new(rig, recording, &tips).filter(|_| turns_freely) {
         let has_poses = recording.samples.iter().any(|sample| sample.pose.is_some());
         let in_degrees = (!has_poses).then(|| self::tips(rig, recording, |reading| reading.to_radians()));
@@ -83,7 +106,12 @@ pub fn examine(rig: &Rig, recording: &Recording, options: &calibrate::Options) -
     let is_seen = |sample: &crate::recording::Sample| !sample.pixels.is_empty() || !sample.points.is_empty();
     let is_read = |sample: &crate::recording::Sample| sample.joints.is_some() || sample.pose.is_some();
     if recording.samples.iter().any(|sample| is_seen(sample) && is_read(sample)) {
-        pixels::examine(rig, recording, options, &mut diagnosis);
+        pixels::examine(rig, recording, options, &mut diagnosis, watch);
+    }
+    // Readings in a wrong unit are outside of limits too.
+    if diagnosis.findings.iter().any(|finding| finding.what.contains("degrees") || finding.what.contains("millimetres"))
+    {
+        diagnosis.findings.retain(|finding| !finding.what.contains(data::LIMITS));
     }
     let mut known: Vec<Finding> = Vec::new();
     for finding in std::mem::take(&mut diagnosis.findings) {
@@ -117,6 +145,22 @@ fn is_clearly_better(misfit: Option<Misfit>, as_recorded: Option<Misfit>) -> boo
 }
 
 impl Misfit {
+    /// Its size in relation to what the rig's `[noise]` alone would leave; `None` where that is not stated.
+    pub fn over_noise(&self, noise: &Noise) -> Option<f64> {
+        let ratio = self.size() / self.of_noise(noise)?.size();
+        ratio.is_finite().then_some(ratio)
+    }
+
+    /// What noise alone would leave of the same kind; `None` where that is not stated. The median distance of Gaussian errors is σ √(2 ln 2) in
+    /// the image and 1.538 σ in space.
+    pub fn of_noise(&self, noise: &Noise) -> Option<Misfit> {
+        match self {
+            Misfit::Pixels(_) => Some(Misfit::Pixels(noise.pixels * (2.0 * std::f64::consts::LN_2).sqrt())),
+            Misfit::Points(_) => Some(Misfit::Points(noise.points * MEDIAN_IN_SPACE)),
+            Misfit::Poses { .. } => None,
+        }
+    }
+
     /// Pixels, metres, or turn and shift weighed against each other: comparable among misfits of one kind.
     fn size(&self) -> f64 {
         match self {

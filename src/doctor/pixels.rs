@@ -1,7 +1,7 @@
 //! Which reading of joints or tip poses explains the pixels and points: a calibration per alternative.
 use super::alternatives::{self, Alternative};
 use super::images::{self, Axes};
-use super::{Diagnosis, Finding, Misfit, Score, is_clearly_better, lag};
+use super::{Diagnosis, Finding, Misfit, Score, Watch, is_clearly_better, lag};
 use crate::Error;
 use crate::calibrate::{self, Calibration, Errors, Finding as Unfit, calibrate, evaluate};
 use crate::recording::Recording;
@@ -17,14 +17,20 @@ const NOISE_OF_POINTS: f64 = 2.6;
 const FINER: f64 = 0.8;
 
 /// Adds scores and findings.
-pub(super) fn examine(rig: &Rig, recording: &Recording, options: &calibrate::Options, diagnosis: &mut Diagnosis) {
+pub(super) fn examine(
+    rig: &Rig,
+    recording: &Recording,
+    options: &calibrate::Options,
+    diagnosis: &mut Diagnosis,
+    watch: &mut Watch<'_>,
+) {
     let axes = images::axes(rig, recording);
     let (axes_name, axes_change) = ("u and v are swapped", "write pixels as [u, v]: u to the right, v down");
     if axes == Axes::Swapped {
         diagnosis.findings.push(finding(axes_name, axes_change));
         return;
     }
-    let (as_recorded, found) = match learn(rig, recording, options) {
+    let (as_recorded, found) = match learn(rig, recording, options, "as recorded", watch) {
         Ok(learned) => (median(&learned.rig, recording), learned.report.findings),
         Err(error) => {
             diagnosis.unsolved = Some(error.to_string());
@@ -39,7 +45,6 @@ pub(super) fn examine(rig: &Rig, recording: &Recording, options: &calibrate::Opt
     // What free intrinsics can hide shows where they are held.
     let held = images::held(rig, recording);
     let is_held = held.estimate != rig.estimate;
-    let as_held = |given: Option<Misfit>| if is_held { score(&held, recording, options) } else { given };
     let mut reference = None;
     let mut hidden: Vec<Alternative> = Vec::new();
     let suspects = images::suspects(rig, recording);
@@ -54,22 +59,24 @@ pub(super) fn examine(rig: &Rig, recording: &Recording, options: &calibrate::Opt
     }
     let mut best: Option<(Misfit, Finding)> = None;
     for alternative in hidden {
-        let misfit = score(&alternative.rig, &alternative.recording, options);
-        let reference = *reference.get_or_insert_with(|| as_held(as_recorded));
+        let misfit = score(&alternative.rig, &alternative.recording, options, &alternative.name, watch);
+        let reference = *reference.get_or_insert_with(|| {
+            if is_held { score(&held, recording, options, "as recorded", watch) } else { as_recorded }
+        });
         consider(alternative, misfit, reference, &mut best, diagnosis);
     }
     let explains = |misfit: &Misfit| is_explained(misfit, &rig.noise);
     let is_fine = |best: &Option<(Misfit, Finding)>| best.as_ref().is_some_and(|(misfit, _)| explains(misfit));
     if !is_fine(&best) && !as_recorded.as_ref().is_some_and(explains) {
         for alternative in alternatives::all(rig, recording) {
-            let misfit = score(&alternative.rig, &alternative.recording, options);
+            let misfit = score(&alternative.rig, &alternative.recording, options, &alternative.name, watch);
             consider(alternative, misfit, as_recorded, &mut best, diagnosis);
             if is_fine(&best) {
                 break;
             }
         }
-        if let Some(lag) = (!is_fine(&best)).then(|| lag::find(rig, recording, options)).flatten() {
-            let misfit = score(rig, &lag.recording, options);
+        if let Some(lag) = (!is_fine(&best)).then(|| lag::find(rig, recording, options, watch)).flatten() {
+            let misfit = score(rig, &lag.recording, options, "a lag", watch);
             let (by, side) = (lag.seconds.abs(), if lag.seconds > 0.0 { "late" } else { "early" });
             let name = format!("joints are stamped {by:.3} s too {side}");
             let sign = if lag.seconds > 0.0 { "subtract" } else { "add" };
@@ -121,13 +128,28 @@ fn finding(what: &str, change: &str) -> Finding {
     Finding { what: what.to_owned(), change: change.to_owned() }
 }
 
-/// Calibrates, watched by nobody.
-pub(super) fn learn(rig: &Rig, recording: &Recording, options: &calibrate::Options) -> Result<Calibration, Error> {
-    calibrate(rig, recording, options, &mut |_| ControlFlow::Continue(()))
+/// Calibrates under a hypothesis.
+pub(super) fn learn(
+    rig: &Rig,
+    recording: &Recording,
+    options: &calibrate::Options,
+    hypothesis: &str,
+    watch: &mut Watch<'_>,
+) -> Result<Calibration, Error> {
+    calibrate(rig, recording, options, &mut |progress| {
+        watch(hypothesis, progress);
+        ControlFlow::Continue(())
+    })
 }
 
-fn score(rig: &Rig, recording: &Recording, options: &calibrate::Options) -> Option<Misfit> {
-    median(&learn(rig, recording, options).ok()?.rig, recording)
+fn score(
+    rig: &Rig,
+    recording: &Recording,
+    options: &calibrate::Options,
+    hypothesis: &str,
+    watch: &mut Watch<'_>,
+) -> Option<Misfit> {
+    median(&learn(rig, recording, options, hypothesis, watch).ok()?.rig, recording)
 }
 
 /// How well a learned rig explains all of a recording.

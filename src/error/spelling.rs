@@ -10,9 +10,19 @@ pub(crate) fn suggestion<'a>(found: &str, known: impl IntoIterator<Item = &'a st
     }
 }
 
-/// The first of the known words with the fewest edits, where a third of the letters or fewer have to change.
+/// "did you mean `ur3e`? " where a known name is near, and then all of them: for what is named on the command line.
+pub(crate) fn shipped<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let known: Vec<&str> = known.into_iter().collect();
+    let meant = nearest(found, &known).map_or_else(String::new, |word| format!("did you mean `{word}`? "));
+    format!("({meant}known: {})", known.join(", "))
+}
+
+/// The known word with the fewest edits, where a third of the letters or fewer have to change.
 fn nearest<'a>(found: &str, known: &[&'a str]) -> Option<&'a str> {
-    let (edits, word) = known.iter().map(|word| (edit_distance(found, word), *word)).min_by_key(|(edits, _)| *edits)?;
+    // Among equals one that was not written to its end.
+    let key = |word: &&str| (edit_distance(found, word), !word.starts_with(found));
+    let word = *known.iter().min_by_key(|word| key(word))?;
+    let edits = edit_distance(found, word);
     let length = found.chars().count().max(word.chars().count());
     (edits * 3 <= length).then_some(word)
 }

@@ -1,4 +1,5 @@
 //! Cameras of a rig as calibration files.
+use super::unit::comment;
 use crate::Error;
 use crate::intrinsics::{Intrinsics, to_kalibr};
 use crate::rig::{Camera, Parent, Rig};
@@ -23,10 +24,18 @@ pub fn to_intrinsics(camera: &Camera) -> Result<Intrinsics, Error> {
 
 /// All cameras as a Kalibr camchain; those that stand in the world are posed against one another.
 ///
-/// Errors: [`Error::Unusable`] for what is not known, and what Kalibr has no words for.
+/// Where the lengths are no metres, a comment above says so.
+///
+/// Errors: [`Error::Unusable`] for a rig without cameras, for what is not known, and what Kalibr has no words for.
 pub fn to_camchain(rig: &Rig) -> Result<String, Error> {
+    if rig.cameras.is_empty() {
+        return Err(Error::Unusable("the rig has no cameras".into()));
+    }
     let in_world = |camera: &Camera| camera.pose.filter(|_| camera.parent == Parent::World);
     let cameras: Result<Vec<_>, Error> =
         rig.cameras.iter().map(|camera| Ok((to_intrinsics(camera)?, in_world(camera)))).collect();
-    to_kalibr(&cameras?)
+    let cameras = cameras?;
+    // Cameras without poses next to each other have no lengths.
+    let has_lengths = cameras.windows(2).any(|pair| pair.iter().all(|(_, pose)| pose.is_some()));
+    Ok(if has_lengths { comment(rig) } else { String::new() } + &to_kalibr(&cameras)?)
 }

@@ -1,4 +1,5 @@
 //! Where the base and the cameras stand, as ROS takes it: static_transform_publisher, and the YAML of tf2_msgs/TFMessage.
+use super::unit::comment;
 use crate::Error;
 use crate::geometry::orientation;
 use crate::rig::{Parent, Rig};
@@ -15,9 +16,11 @@ struct Transform {
 /// One command line of static_transform_publisher (ROS 2) for the base, where its pose is known, and for each camera. A
 /// camera's frame is the optical one: z forward, x right, y down.
 ///
-/// Errors: [`Error::Unusable`] where a camera has no pose.
+/// Where the lengths are no metres, a comment above says so.
+///
+/// Errors: [`Error::Unusable`] where a camera has no pose, and where there is neither a camera nor the pose of a base.
 pub fn to_static_transforms(rig: &Rig) -> Result<String, Error> {
-    let mut text = String::new();
+    let mut text = comment(rig);
     for Transform { parent, child, pose } in transforms(rig)? {
         let [x, y, z] = numbers(pose.translation.into());
         let [qx, qy, qz, qw] = numbers(orientation::to_quaternion(&pose.rotation));
@@ -35,9 +38,9 @@ pub fn to_static_transforms(rig: &Rig) -> Result<String, Error> {
 /// The same as a tf2_msgs/TFMessage in YAML: `ros2 topic pub --once /tf_static tf2_msgs/msg/TFMessage "$(cat tf.yaml)"`, with the
 /// quality of service of /tf_static.
 ///
-/// Errors: [`Error::Unusable`] where a camera has no pose.
+/// Errors: as above.
 pub fn to_tf(rig: &Rig) -> Result<String, Error> {
-    let mut text = "transforms:\n".to_owned();
+    let mut text = format!("{}transforms:\n", comment(rig));
     for Transform { parent, child, pose } in transforms(rig)? {
         let [x, y, z] = numbers(pose.translation.into());
         let [qx, qy, qz, qw] = numbers(orientation::to_quaternion(&pose.rotation));
@@ -72,6 +75,11 @@ fn transforms(rig: &Rig) -> Result<Vec<Transform>, Error> {
             child: camera.name.clone(),
             pose: camera.pose.ok_or_else(unknown)?,
         });
+    }
+    if all.is_empty() {
+        let problem =
+            "the rig has no cameras, and no pose of its base in the world: there is nothing to say where it is";
+        return Err(Error::Unusable(problem.into()));
     }
     Ok(all)
 }

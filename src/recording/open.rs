@@ -8,32 +8,38 @@ use std::path::Path;
 pub enum Format {
     /// What has no other ending.
     JsonLines,
-    /// `.mcap`
+    /// `.mcap`, or the folder that ROS 2 makes of a bag; `.db3` too, which is refused with what makes the other of it.
     Bag,
     /// `.csv`, `.tsv`
     Csv,
     /// `.parquet`
     Parquet,
-    /// A folder.
+    /// Any other folder.
     LeRobot,
 }
 
 impl Format {
-    /// The format of a file, by the ending of its name, whatever its case.
+    /// The format of a file, by the ending of its name, whatever its case; of a folder, by what is in it.
     pub fn of(path: &Path) -> Format {
         let ending = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
         match ending.as_deref() {
-            Some("mcap") => Format::Bag,
+            _ if path.is_dir() => {
+                if bag::is_bag(path) {
+                    Format::Bag
+                } else {
+                    Format::LeRobot
+                }
+            }
+            Some("mcap" | "db3") => Format::Bag,
             Some("csv" | "tsv") => Format::Csv,
             Some("parquet") => Format::Parquet,
-            _ if path.is_dir() => Format::LeRobot,
             _ => Format::JsonLines,
         }
     }
 }
 
-/// What of a file is meant, where it alone does not tell. Options of one format are nothing to the others, and none but `cameras` is
-/// anything to JSON Lines, where joints stand in the right order.
+/// What of a file is meant, where it alone does not tell. Options of one format are nothing to the others, and none but
+/// `known_joints` and `cameras` is anything to JSON Lines.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct OpenOptions {
     /// Names of the joints from base to tip, some of those in the file; empty: `known_joints`, or all in the order of the file's columns or of
@@ -71,7 +77,16 @@ impl Recording {
                 let mut recording = Recording::read(path)?;
                 let described = recording.describe_cameras(&options.cameras);
                 described.map_err(|problem| Error::Unusable(format!("{}: {problem}", path.display())))?;
-                Ok(Opened { recording, notes: Vec::new(), images: Vec::new() })
+                let order = recording.joints.join(", ");
+                let is_ordered = recording.order_joints(&options.known_joints);
+                let note = || {
+                    let ours = recording.joints.join(", ");
+                    format!(
+                        "joints are taken by their names, in the order of the rig: {ours}; the file has them in the order {order}"
+                    )
+                };
+                let notes = is_ordered.then(note).into_iter().collect();
+                Ok(Opened { recording, notes, images: Vec::new() })
             }
             Format::Bag => bag::read(path, options, None),
             Format::Csv => table::read_csv(path, options),

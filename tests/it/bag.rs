@@ -420,3 +420,57 @@ fn what_a_bag_lacks_is_said_with_what_it_has() {
     assert!(error.contains("no.mcap"), "{error}");
     assert!(!Path::new(&folder.path().join("out.jsonl")).exists());
 }
+
+/// The bag in two files, the second of which has its own numbers of channels, in the folder that ROS 2 makes.
+fn split(bytes: &[u8], folder: &Path) {
+    std::fs::create_dir_all(folder).unwrap();
+    std::fs::write(folder.join("metadata.yaml"), "rosbag2_bagfile_information: {}\n").unwrap();
+    let messages: Vec<_> = mcap::MessageStream::new(bytes).unwrap().map(Result::unwrap).collect();
+    let (first, second) = messages.split_at(messages.len() / 2);
+    // Letter by letter the second one comes first.
+    for (name, part) in [("run_9.mcap", first), ("run_10.mcap", second)] {
+        let mut writer = WriteOptions::new().create(Cursor::new(Vec::new())).unwrap();
+        part.iter().for_each(|message| writer.write(message).unwrap());
+        writer.finish().unwrap();
+        std::fs::write(folder.join(name), writer.into_inner().into_inner()).unwrap();
+    }
+}
+
+#[test]
+fn the_folder_of_a_bag_that_was_split_is_read_as_the_whole_bag() {
+    let folder = Folder::new("bag-folder");
+    let bytes = bag(&recorded(), WriteOptions::new(), true);
+    let whole = read(&bytes, &folder).unwrap();
+    let parts = folder.path().join("run");
+    split(&bytes, &parts);
+    let options = OpenOptions { known_joints: recorded().joints, ..OpenOptions::default() };
+    let joined = Recording::open_with(&parts, &options).unwrap();
+    assert_eq!(joined.recording, whole.recording);
+    assert_eq!(joined.notes, whole.notes);
+    folder.expect(0, "convert run -o run.jsonl --join 0");
+    folder.expect(0, "check ur5 run");
+    // A part that is cut off is named, and the other one is read.
+    let last = std::fs::read(parts.join("run_10.mcap")).unwrap();
+    std::fs::write(parts.join("run_10.mcap"), &last[..last.len() / 2]).unwrap();
+    let cut = Recording::open_with(&parts, &options).unwrap();
+    assert!(cut.notes[0].starts_with("run_10.mcap: is cut off at byte"), "{:?}", cut.notes);
+    // A recorder that was killed leaves no metadata.
+    std::fs::remove_file(parts.join("metadata.yaml")).unwrap();
+    assert_eq!(Recording::open_with(&parts, &options).unwrap().recording, cut.recording);
+}
+
+#[test]
+fn a_bag_in_sqlite_is_refused_with_what_makes_it_one_that_is_read() {
+    let folder = Folder::new("bag-sqlite");
+    std::fs::create_dir(folder.path().join("run")).unwrap();
+    folder.write("run/metadata.yaml", "").write("run/run_0.db3", "SQLite format 3");
+    for file in ["run", "run/run_0.db3"] {
+        let (_, err) = folder.expect(2, &format!("calibrate {file} -o learned.toml"));
+        assert!(err.starts_with(&format!("error: {file}: is a bag in SQLite")), "{err}");
+        assert!(err.contains(&format!("`ros2 bag convert -i {file} -o mcap.yaml`")), "{err}");
+    }
+    std::fs::create_dir(folder.path().join("other")).unwrap();
+    folder.write("other/text", "");
+    let (_, err) = folder.expect(2, "calibrate other -o learned.toml");
+    assert!(err.contains("is a folder, and neither a LeRobot dataset") && err.contains("nor a bag"), "{err}");
+}

@@ -2,11 +2,12 @@
 #[path = "../../benches/common/faults.rs"]
 mod faults;
 
+use crate::cli::Folder;
 use faults::Fault;
 use handeye::calibrate::Options;
-use handeye::doctor::examine;
+use handeye::doctor::{examine, examine_watched};
 use handeye::recording::Recording;
-use handeye::rig::Rig;
+use handeye::rig::{Rig, catalog};
 use handeye::simulate::{SimulateOptions, random_rig, simulate};
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=5;
@@ -123,5 +124,67 @@ fn joints_that_are_stamped_late_or_early_are_found_and_nothing_is_in_clean_motio
     assert_eq!(found(&rig, &recording), Vec::<String>::new());
     for fault in faults::of_dense_motion() {
         is_found(&fault, faults::dense_motion(1), 1);
+    }
+}
+
+/// Another robot's limits: how many readings are beyond them is counted here too.
+#[test]
+fn readings_outside_the_limits_of_the_rig_are_found_first() {
+    let mut rig = catalog::rig("ur5").unwrap();
+    let recording = simulate(&rig, &SimulateOptions { samples: 20, ..SimulateOptions::default() }).unwrap().recording;
+    assert!(!found(&rig, &recording).iter().any(|what| what.contains("limits")));
+    let mut read: Vec<f64> = recording.samples.iter().map(|sample| sample.joints.as_ref().unwrap()[2]).collect();
+    read.sort_by(f64::total_cmp);
+    // Between two readings, further from both than readings are noisy.
+    let upper =
+        (3..17).map(|k| 0.5 * (read[k] + read[k + 1])).find(|middle| read.iter().all(|r| (r - middle).abs() > 0.02));
+    rig.robot.joints[2].limits.upper = upper;
+    let beyond = read.iter().filter(|reading| **reading > upper.unwrap()).count();
+    let name = rig.robot.joints[2].name.clone();
+    let expected = format!("{beyond} of 20 readings of joint `{name}` are outside the rig's limits");
+    let found = found(&rig, &recording);
+    assert!(found.len() == 1 && found[0].starts_with(&expected), "{expected}: {found:?}");
+}
+
+#[test]
+fn joints_in_another_order_than_the_rigs_are_the_only_finding_and_nothing_is_learned() {
+    let rig = catalog::rig("ur5").unwrap();
+    let mut recording =
+        simulate(&rig, &SimulateOptions { samples: 12, ..SimulateOptions::default() }).unwrap().recording;
+    recording.joints.rotate_left(2);
+    let mut steps = 0;
+    let diagnosis = examine_watched(&rig, &recording, &Options::default(), &mut |_, _| steps += 1);
+    assert!(diagnosis.findings.len() == 1 && diagnosis.scores.is_empty() && steps == 0, "{steps} {diagnosis:?}");
+    let finding = &diagnosis.findings[0];
+    assert!(finding.what.contains(&recording.joints.join(", ")), "{finding:?}");
+    recording.joints.rotate_right(2);
+    examine_watched(&rig, &recording, &Options::default(), &mut |hypothesis, _| {
+        assert_eq!(hypothesis, "as recorded");
+        steps += 1;
+    });
+    assert!(steps > 0, "what takes long is told");
+}
+
+/// Pixels that are off by up to 15 px are learned from as if nothing were, and no mistake explains them.
+#[test]
+fn a_check_says_that_it_fits_only_where_noise_explains_the_misfit() {
+    let folder = Folder::new("check-misfit");
+    folder.expect(0, "simulate ur5 --samples 12 --seed 3 -o clean.jsonl");
+    let mut recording = Recording::read(&folder.path().join("clean.jsonl")).unwrap();
+    for (index, seen) in recording.samples.iter_mut().flat_map(|sample| &mut sample.pixels).enumerate() {
+        seen.pixel[0] += 15.0 * (97.0 * index as f64).sin();
+        seen.pixel[1] += 15.0 * (131.0 * index as f64).sin();
+    }
+    recording.write(&folder.path().join("off.jsonl")).unwrap();
+    for (file, least, most, says) in
+        [("clean", 0.5, 1.5, "as recorded it fits: "), ("off", 10.0, 100.0, "as recorded it does not fit: ")]
+    {
+        let (text, err) = folder.expect(0, &format!("check ur5 {file}.jsonl"));
+        assert!(text.contains(says) && !text.contains("the recording fits"), "{file}: {text}");
+        assert_eq!(err, "", "progress is for terminals");
+        let (json, _) = folder.expect(0, &format!("check ur5 {file}.jsonl --json"));
+        let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+        let ratio = json["misfit_over_noise"].as_f64().unwrap();
+        assert!((least..most).contains(&ratio), "{file}: {ratio}");
     }
 }

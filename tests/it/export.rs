@@ -3,7 +3,7 @@ use crate::cli::Folder;
 use crate::intrinsics::same;
 use handeye::export::{to_camchain, to_intrinsics, to_static_transforms, to_tf};
 use handeye::intrinsics::read_intrinsics;
-use handeye::rig::{Camera, Parent, Rig, catalog};
+use handeye::rig::{Camera, Fit, Parent, Rig, catalog};
 use handeye::solvers::Pose;
 use handeye::solvers::manifold::so3;
 use nalgebra::Vector3;
@@ -109,4 +109,38 @@ fn export_writes_every_format_from_the_command_line() {
     let camera = &catalog::rig("ur5").unwrap().cameras[0];
     let (text, _) = folder.expect(0, "export ur5 --to camera-info --camera left");
     assert!(same(&to_intrinsics(camera).unwrap(), &read_intrinsics(&text, "x", None).unwrap()));
+}
+
+#[test]
+fn lengths_that_are_no_metres_are_not_given_for_such_without_a_word() {
+    let folder = Folder::new("export-unit");
+    let mut rig = catalog::rig("ur5").unwrap();
+    let metres = to_static_transforms(&rig).unwrap();
+    let unit = "lengths are in units of a of joint `elbow`: nothing that is known is metric";
+    rig.fit = Some(Fit { gauge: vec!["the base is held".into()], ..Fit::default() });
+    rig.write(&folder.path().join("metric.toml"), None).unwrap();
+    rig.fit = Some(Fit { gauge: vec!["the base is held".into(), unit.into()], ..Fit::default() });
+    rig.write(&folder.path().join("learned.toml"), None).unwrap();
+    for format in ["static-transforms", "tf", "kalibr"] {
+        let (out, err) = folder.expect(0, &format!("export learned.toml --to {format}"));
+        let (comment, rest) = out.split_once('\n').unwrap();
+        assert!(comment.starts_with("# these are not metres: ") && comment.contains(unit), "{format}: {out}");
+        assert!(comment.contains("--rig"), "what would do: {comment}");
+        let (expected, _) = folder.expect(0, &format!("export metric.toml --to {format}"));
+        assert_eq!(rest, expected, "{format}");
+        assert!(err.starts_with("note: learned.toml: these are not metres: ") && err.lines().count() == 1, "{err}");
+    }
+    let (out, err) = folder.expect(0, "export learned.toml --to opencv --camera left");
+    assert!(!out.contains("metres") && err.is_empty(), "a camera's intrinsics have no lengths: {out}{err}");
+    assert!(!metres.contains('#'));
+}
+
+#[test]
+fn a_rig_without_anything_to_say_is_refused() {
+    let folder = Folder::new("export-nothing");
+    folder.write("arm.toml", "name = \"arm\"\n");
+    for format in ["static-transforms", "tf", "kalibr"] {
+        let (out, err) = folder.expect(2, &format!("export arm.toml --to {format}"));
+        assert!(out.is_empty() && err.starts_with("error: the rig has no cameras"), "{format}: {out}{err}");
+    }
 }

@@ -7,6 +7,7 @@ mod cli;
 mod cli_calibrate;
 mod cli_infer;
 mod cli_servo;
+mod cli_slips;
 mod depth;
 mod detect;
 mod detect_recordings;

@@ -326,3 +326,13 @@ fn the_command_lists_positions_writes_them_for_the_robot_and_says_what_they_buy(
     let (_, refused) = folder.expect(2, "suggest learned.toml --with motions.jsonl -o motions.jsonl");
     assert!(refused.contains("is an input too"), "{refused}");
 }
+
+#[test]
+fn the_rig_that_calibration_started_from_is_asked_for_by_its_option() {
+    let folder = Folder::new("suggest-start");
+    folder.expect(0, "simulate ur5 --samples 12 --seed 3 -o motions.jsonl");
+    folder.expect(0, "calibrate motions.jsonl --rig ur5 -o arm.toml");
+    let (_, err) = folder.expect(2, "suggest arm.toml --with motions.jsonl");
+    assert!(err.contains("give the rig that calibration started from, as `--rig RIG`"), "{err}");
+    folder.expect(0, "suggest arm.toml --with motions.jsonl --rig ur5 --count 1");
+}

@@ -96,11 +96,11 @@ pub(super) fn check_freedom(setup: &Setup, freedom: &Freedom, fit: &Fit, is_give
             let problem = if is_given {
                 "is free in one of the given rig and the learned one, and held in the other: that is not the rig that learning started from"
             } else if then.contains(path) {
-                "was free when the rig was learned, and is held where nothing is known beforehand: give the rig that learning \
-                 started from (--rig)"
+                "was free when the rig was learned, and is held where nothing is known beforehand: give the rig that calibration \
+                 started from, as `--rig RIG`"
             } else {
-                "was held when the rig was learned, and is free where nothing is known beforehand: give the rig that learning \
-                 started from (--rig), or calibrate all of it again where only a part was relearned"
+                "was held when the rig was learned, and is free where nothing is known beforehand: give the rig that calibration \
+                 started from, as `--rig RIG`; where only a part was relearned, calibrate all of it again"
             };
             Err(Error::Unusable(format!("`{path}` {problem}")))
         }

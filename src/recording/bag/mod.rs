@@ -1,8 +1,9 @@
-//! Bags of ROS 2 in MCAP files as recordings.
+//! Bags of ROS 2 in MCAP files, or folders of them, as recordings.
 //!
 //! A bag is read twice, in the memory that one chunk and the samples take: images first, which are the samples, and then where the
 //! robot was at their stamps. Messages are decoded by the schemas that the file carries.
 mod cameras;
+mod folder;
 mod frames;
 mod images;
 mod kinds;
@@ -18,6 +19,7 @@ use super::names::tidy;
 use super::track::At;
 use super::{OpenOptions, Opened, Recording};
 use crate::Error;
+pub(super) use folder::is_bag;
 use images::Images;
 use kinds::Kind;
 use states::States;
@@ -65,7 +67,7 @@ impl Recording {
     }
 }
 
-/// Reads an MCAP file; what `detect` finds in its images is taken in place of the features that it holds.
+/// Reads an MCAP file, or those of a folder as one; what `detect` finds in its images is taken in place of the features that it holds.
 ///
 /// Features: the corners of AprilTags `FAMILY:ID/CORNER`, the centres of Detection2D by their id. Samples are the times at which images show
 /// features, in their order, with joint states interpolated to their stamps, tip poses too (slerp). A file that is cut off or damaged is read as
@@ -84,8 +86,9 @@ pub(super) fn read<'a>(
         None => "image with features (apriltag_msgs/AprilTagDetectionArray or vision_msgs/Detection2DArray)",
     };
     let mut images = Images::new(path, of_bag, detect);
-    let problem = messages::visit(path, &mut images)?;
-    let mut notes: Vec<String> = problem.into_iter().chain(images.finish()?).collect();
+    let files = folder::files(path)?;
+    let problems = messages::visit(&files, &mut images)?;
+    let mut notes: Vec<String> = problems.into_iter().chain(images.finish()?).collect();
     let (cameras, camera_of_source) = cameras::cameras(path, &mut images, options)?;
     let within = of_bag.join.map(|seconds| (seconds * 1e9) as i64);
     let groups = groups(&images.images, &camera_of_source, within);
@@ -107,7 +110,7 @@ pub(super) fn read<'a>(
     let moments: Vec<i64> = groups.iter().map(|group| group.time).collect();
     let mut states = States::new(path, options, &moments, [joint_topic, pose_topic]);
     if joint_topic.is_some() || pose_topic.is_some() || of_bag.frames.is_some() {
-        messages::visit(path, &mut states)?;
+        messages::visit(&files, &mut states)?;
     }
     let poses = match &of_bag.frames {
         Some([base, tip]) => states

@@ -79,7 +79,8 @@ pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     }
     if files.is_empty() {
         return Err(Error::Unusable(format!(
-            "{}: is a folder, and no LeRobot dataset, which has `meta/info.json` and Parquet files in `data`",
+            "{}: is a folder, and neither a LeRobot dataset, which has `meta/info.json` and Parquet files in `data`, nor a bag, which has \
+             `metadata.yaml` and .mcap files",
             folder.display()
         )));
     }
