@@ -245,7 +245,10 @@ pub fn camera_deviations(learned: &Rig) -> Vec<String> {
         let [x, y, z, turns @ ..] = sd.as_slice() else { return None };
         let turn = turns.iter().map(|sd| sd * sd).sum::<f64>().sqrt();
         let [mm, deg] = [1e3 * (x * x + y * y + z * z).sqrt(), turn.to_degrees()];
-        Some(format!("the pose of camera `{}` is known to {mm:.3} mm and {deg:.3}° (standard deviation)", camera.name))
+        Some(format!(
+            "the pose of camera `{}` is known to {mm:.3} mm and {deg:.3}° (standard deviation, with the priors)",
+            camera.name
+        ))
     };
     learned.cameras.iter().filter_map(of_camera).collect()
 }

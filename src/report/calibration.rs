@@ -52,7 +52,7 @@ pub fn html(subject: &Subject<'_>) -> Result<String, Error> {
     let rig = &subject.calibration.rig;
     let residuals = residuals(rig, subject.recording)?;
     let mut page = Page::new(subject.title);
-    verdict::section(&mut page, subject);
+    verdict::section(&mut page, subject, &residuals);
     summary(&mut page, subject);
     sections::cameras(&mut page, rig, &subject.calibration.report.cameras, &residuals);
     let report = &subject.calibration.report;

@@ -4,6 +4,9 @@ use crate::rig::Rig;
 /// Terms that are shown.
 const TERMS: usize = 5;
 
+/// A term that rounds to nothing beside the largest, which is 1, is only counted.
+const LEAST: f64 = 0.005;
+
 /// Numbers move alike where they differ by less than this share of the largest.
 const ALIKE: f64 = 0.1;
 
@@ -11,7 +14,7 @@ const ALIKE: f64 = 0.1;
 pub(super) fn together(rig: &Rig, numbers: &[(String, f64)]) -> String {
     let mut left: Vec<&(String, f64)> = numbers.iter().collect();
     let mut terms = Vec::new();
-    while terms.len() < TERMS && !left.is_empty() {
+    while terms.len() < TERMS && left.first().is_some_and(|(_, weight)| terms.is_empty() || weight.abs() >= LEAST) {
         let (path, weight) = left[0];
         let (all, members) = alike(rig, &left).unwrap_or_else(|| (path.clone(), vec![0]));
         terms.push(format!("{weight:+.2} {all}"));

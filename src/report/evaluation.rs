@@ -10,6 +10,10 @@ use crate::rig::Rig;
 /// A rig that was fitted well predicts what it has not seen within this many times its own residuals.
 const WORSE: f64 = 1.5;
 
+/// A camera is off only where all together are further off than this many times what they were: each has its own usual error, of which a rig
+/// file does not tell.
+const TOGETHER: f64 = 1.1;
+
 /// The page of how well a rig predicts a recording. `title` stands at the top.
 ///
 /// Errors: [`Error::Unusable`] where rig and recording do not fit.
@@ -76,14 +80,17 @@ pub fn evaluation_steps(rig: &Rig, evaluation: &Evaluation) -> Vec<String> {
     let fit = rig.fit.as_ref();
     let usual_px = fit.map(|fit| fit.rms_px).filter(|px| *px > 0.0);
     let usual_m = fit.and_then(|fit| fit.rms_points_m).filter(|m| *m > 0.0);
-    let exceeds = |found: f64, usual: Option<f64>| usual.is_some_and(|usual| found > WORSE * usual);
+    let is_beyond = |found: f64, usual: Option<f64>, times: f64| usual.is_some_and(|usual| found > times * usual);
+    let total = &fitting.total;
+    let exceeds_px = |px: f64| is_beyond(total.rms_px, usual_px, TOGETHER) && is_beyond(px, usual_px, WORSE);
+    let exceeds_m = |m: f64| is_beyond(total.points.rms_m, usual_m, TOGETHER) && is_beyond(m, usual_m, WORSE);
     let moved = |name: &str| {
         let is_it = |finding: &Finding| matches!(finding, Finding::CameraMoved { camera, .. } if camera == name);
         fitting.findings.iter().any(is_it)
     };
     let is_off = |camera: &&CameraErrors| {
         let errors = &camera.errors;
-        moved(&camera.name) || exceeds(errors.rms_px, usual_px) || exceeds(errors.points.rms_m, usual_m)
+        moved(&camera.name) || exceeds_px(errors.rms_px) || exceeds_m(errors.points.rms_m)
     };
     let off: Vec<&CameraErrors> = fitting.cameras.iter().filter(is_off).collect();
     let seeing = evaluation.cameras.iter().filter(|camera| camera.errors.observations > 0).count();

@@ -20,18 +20,17 @@ const WRONG: f64 = 10.0;
 /// The answer, and the distances beside what Gaussian noise of their own size gives. `findings`: what was left out.
 pub(super) fn section(page: &mut Page, rig: &Rig, residuals: &[Residual], findings: &[Finding]) {
     let sds = scales(rig, residuals);
-    let used: Vec<&Residual> = residuals.iter().filter(|one| !is_left_out(rig, one, findings, &sds)).collect();
+    let used = in_use(rig, residuals, findings, &sds);
     if used.is_empty() {
         return;
     }
-    let over_sd = |residual: &Residual| residual.error.map(|error| error / sds[residual.camera]);
-    let coordinates: Vec<f64> = used.iter().flat_map(|residual| over_sd(residual)).collect();
     page.section("histogram", "Are the errors noise?");
     let left_out = match residuals.len() - used.len() {
         0 => "Nothing was left out of these figures.".to_owned(),
         count => format!("The {count} detections that do not fit are not counted."),
     };
-    page.paragraph(&format!("{} {left_out}", answer(&used, &coordinates, over_sd)));
+    page.paragraph(&format!("{} {left_out}", answer(&used, &sds).1));
+    let coordinates: Vec<f64> = used.iter().flat_map(|residual| over_sd(residual, &sds)).collect();
     let gaussian = |x: f64| (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt();
     page.drawing(
         &histogram(&coordinates, [-5.0, 5.0], 50, Some(&gaussian)),
@@ -39,15 +38,31 @@ pub(super) fn section(page: &mut Page, rig: &Rig, residuals: &[Residual], findin
     );
 }
 
+/// Whether nothing but noise is in the errors of what was not left out; true where there are none.
+pub(super) fn is_alone(rig: &Rig, residuals: &[Residual], findings: &[Finding]) -> bool {
+    let sds = scales(rig, residuals);
+    let used = in_use(rig, residuals, findings, &sds);
+    used.is_empty() || answer(&used, &sds).0
+}
+
+fn in_use<'a>(rig: &Rig, residuals: &'a [Residual], findings: &[Finding], sds: &[f64]) -> Vec<&'a Residual> {
+    residuals.iter().filter(|one| !is_left_out(rig, one, findings, sds)).collect()
+}
+
+fn over_sd(residual: &Residual, sds: &[f64]) -> [f64; 2] {
+    residual.error.map(|error| error / sds[residual.camera])
+}
+
 /// Yes or no, and by which figures.
-fn answer(used: &[&Residual], coordinates: &[f64], over_sd: impl Fn(&Residual) -> [f64; 2]) -> String {
+fn answer(used: &[&Residual], sds: &[f64]) -> (bool, String) {
+    let coordinates: Vec<f64> = used.iter().flat_map(|residual| over_sd(residual, sds)).collect();
     let n = coordinates.len() as f64;
     let beyond = coordinates.iter().filter(|x| x.abs() > 3.0).count() as f64 / n;
     // |Σ e|² of n independent errors of two coordinates is 2 n on average.
     let mut images: BTreeMap<(usize, usize), ([f64; 2], f64)> = BTreeMap::new();
     for residual in used {
         let (sum, count) = images.entry((residual.sample, residual.camera)).or_default();
-        let [u, v] = over_sd(residual);
+        let [u, v] = over_sd(residual, sds);
         *sum = [sum[0] + u, sum[1] + v];
         *count += 1.0;
     }
@@ -62,17 +77,15 @@ fn answer(used: &[&Residual], coordinates: &[f64], over_sd: impl Fn(&Residual) -
         1e2 * beyond,
         1e2 * BEYOND
     );
-    match (beyond > most_beyond, shifted > most_shifted) {
-        (false, false) => format!("Yes: {figures}."),
-        (_, true) => format!(
-            "No: {figures}. Whole images are shifted, by joints that do not repeat, a lens model that leaves something out, or images that were \
-             not taken where the joints were read; so the standard deviations on this page, which count every detection as independent, are \
-             too small."
-        ),
-        (true, false) => {
-            format!("No: {figures}. There are more large errors than noise makes: single detections are wrong.")
+    let words = match (beyond > most_beyond, shifted > most_shifted) {
+        (false, false) => return (true, format!("Yes: {figures}.")),
+        (_, true) => {
+            "Whole images are shifted, by joints that do not repeat, a lens model that leaves something out, or images that were not taken where \
+             the joints were read; so the standard deviations on this page, which count every detection as independent, are too small."
         }
-    }
+        (true, false) => "There are more large errors than noise makes: single detections are wrong.",
+    };
+    (false, format!("No: {figures}. {words}"))
 }
 
 fn is_left_out(rig: &Rig, residual: &Residual, findings: &[Finding], sds: &[f64]) -> bool {

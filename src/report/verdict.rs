@@ -1,13 +1,21 @@
 //! The answer in three lines: how well a rig fits, how well its tip is known, and what to do first.
 use super::calibration::Subject;
+use super::noise;
 use super::page::Page;
+use super::residuals::Residual;
 use crate::calibrate::{Finding, Report, assumptions};
 
+/// Said where errors do not look like noise.
+const OTHER_THAN_NOISE: &str =
+    " The errors are not noise alone (see below), so what is given by the data is less certain than the figures say.";
+
 /// The first section of a page.
-pub(super) fn section(page: &mut Page, subject: &Subject<'_>) {
+pub(super) fn section(page: &mut Page, subject: &Subject<'_>, residuals: &[Residual]) {
     page.section("verdict", "In short");
     let next = steps(subject).into_iter().next().unwrap_or_default();
-    page.list(&[fit(subject), tip(subject), format!("What to do next: {next}")]);
+    let is_noise = noise::is_alone(&subject.calibration.rig, residuals, &subject.calibration.report.findings);
+    let fit = fit(subject) + if is_noise { "" } else { OTHER_THAN_NOISE };
+    page.list(&[fit, tip(subject), format!("What to do next: {next}")]);
 }
 
 /// How well it fits, beside what the noise lets expect, and what was left out.

@@ -1,10 +1,10 @@
 //! Pages answer in words: how good a rig is, what hangs on assumptions, what was left out, and what to do next.
 use crate::cli::Folder;
-use handeye::calibrate::{Options, calibrate};
+use handeye::calibrate::{Options, calibrate, evaluate};
 use handeye::recording::{Detection, RecordedCamera, Recording};
-use handeye::report::{Subject, html};
+use handeye::report::{Subject, evaluation_steps, html};
 use handeye::rig::{Rig, catalog};
-use handeye::simulate::{SimulateOptions, simulate};
+use handeye::simulate::{SimulateOptions, random_rig, simulate};
 use serde_json::Value;
 use std::ops::ControlFlow;
 
@@ -113,6 +113,8 @@ fn a_page_says_in_words_whether_the_errors_are_noise() {
         let subject =
             Subject { title: "noise", before: &known, calibration: &learned, recording, suggestion: None, tables: &[] };
         let page = html(&subject).unwrap();
+        let is_said_first = section(&page, "verdict").contains("The errors are not noise alone");
+        assert_eq!(is_said_first, section(&page, "histogram").contains("<p>No: "));
         (section(&page, "histogram").to_owned(), learned.report.rejected)
     };
     let (noise, rejected) = answer(&recording);
@@ -169,4 +171,23 @@ fn an_evaluation_tells_the_error_with_and_without_what_does_not_fit_and_names_it
         assert!(said.contains(words) && page.contains(words), "{words}: {said}");
     }
     assert!(said.contains("without what does not fit, as calibrate leaves it out:"), "{said}");
+}
+
+#[test]
+fn a_camera_that_was_always_worse_than_the_others_is_not_said_to_be_off() {
+    let truth = random_rig(6, 4, 12, 2);
+    let options = SimulateOptions { samples: 40, seed: 2, ..SimulateOptions::default() };
+    let mut recording = simulate(&truth, &options).unwrap().recording;
+    // Five times the noise of 0.3 px, by turns in four directions: one camera of four then has about twice the error of all together.
+    for (number, seen) in recording.samples.iter_mut().flat_map(|sample| &mut sample.pixels).enumerate() {
+        if seen.camera == 0 {
+            seen.pixel[number % 2] += if number % 4 < 2 { 1.5 } else { -1.5 };
+        }
+    }
+    let learned = calibrate(&truth, &recording, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap();
+    let judged = evaluate(&learned.rig, &recording).unwrap();
+    let of_camera = judged.fitting.cameras[0].errors.rms_px / judged.fitting.total.rms_px;
+    assert!(of_camera > 1.5, "{of_camera}");
+    let steps = evaluation_steps(&learned.rig, &judged);
+    assert!(steps[0].contains("about as well as those that it was learned from"), "{steps:?}");
 }
