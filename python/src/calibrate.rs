@@ -252,13 +252,7 @@ impl Calibration {
         let report = self.report();
         let mut lines = vec![self.__repr__().trim_matches(['<', '>']).trim_start_matches("handeye.").to_owned()];
         if let Some(tip) = &report.tip {
-            let length =
-                |length: f64| if tip.metric { format!("{:.3} mm", 1e3 * length) } else { format!("{length:.2e}") };
-            lines.push(format!(
-                "the tip's position is known to {} (median; largest {})",
-                length(tip.median),
-                length(tip.largest)
-            ));
+            lines.push(format!("the tip's position is known to {tip}"));
         }
         for (title, list) in [
             ("left open by the data", &report.gauge),

@@ -1,4 +1,5 @@
 //! Predicts the detections of a recording and compares.
+use super::Fitting;
 use crate::Error;
 use crate::recording::{Recording, Sample};
 use crate::rig::{Camera, Model, Rig};
@@ -64,6 +65,8 @@ pub struct Evaluation {
     pub sample_median_px: Vec<Option<f64>>,
     /// Median distance of the points of every sample [m], where any were compared in it.
     pub sample_median_m: Vec<Option<f64>>,
+    /// The same errors without the images, samples and detections that do not fit, and which these are.
+    pub fitting: Fitting,
 }
 
 /// Distances of single detections from where they are predicted.
@@ -81,7 +84,8 @@ pub struct Distances {
 pub fn evaluate(rig: &Rig, recording: &Recording) -> Result<Evaluation, Error> {
     let mut of_camera = vec![Distances::default(); rig.cameras.len()];
     let mut evaluation = Evaluation::default();
-    for of_sample in distances(rig, recording)? {
+    let samples = distances(rig, recording)?;
+    for of_sample in &samples {
         let mut all = Distances::default();
         for (camera, distances) in of_camera.iter_mut().zip(&of_sample.cameras) {
             camera.extend(distances);
@@ -108,6 +112,7 @@ pub fn evaluate(rig: &Rig, recording: &Recording) -> Result<Evaluation, Error> {
         rejected: 0,
     };
     evaluation.cameras = rig.cameras.iter().zip(&of_camera).map(errors).collect();
+    evaluation.fitting = Fitting::new(rig, recording, &samples);
     Ok(evaluation)
 }
 
@@ -137,7 +142,7 @@ pub fn distances(rig: &Rig, recording: &Recording) -> Result<Vec<SampleDistances
     Ok(recording.samples.iter().map(|sample| of_sample(&model, &index, sample)).collect())
 }
 
-fn of_sample(model: &Model, index: &Correspondence, sample: &Sample) -> SampleDistances {
+pub(crate) fn of_sample(model: &Model, index: &Correspondence, sample: &Sample) -> SampleDistances {
     let mut found = SampleDistances { cameras: vec![Distances::default(); model.cameras.len()], rejected: 0 };
     let from_pose = || sample.pose.map(|tip| vec![model.base, tip]);
     let links = sample.joints.as_ref().map(|joints| model.links(joints)).or_else(from_pose);

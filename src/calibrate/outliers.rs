@@ -34,13 +34,13 @@ impl Verdict {
 }
 
 /// A detection is wrong beyond this many standard deviations; those between are left to the loss.
-const DETECTION: f64 = 10.0;
+pub(crate) const DETECTION: f64 = 10.0;
 
 /// An image belongs to another pose where its median is beyond this many: less may be a robot that does not repeat itself.
-const IMAGE: f64 = 10.0;
+pub(crate) const IMAGE: f64 = 10.0;
 
 /// Detections that an image must have to be judged as a whole.
-const IN_IMAGE: usize = 3;
+pub(crate) const IN_IMAGE: usize = 3;
 
 /// Samples with wrong joints among which swapped pairs are looked for, at most.
 const SWAPPED: usize = 40;
@@ -57,7 +57,7 @@ const SHIFTED: f64 = 4.0;
 const FURTHER: f64 = 2.0;
 
 /// An image: its sample, its camera, and whether its pixels or its points are meant.
-type Image = (usize, usize, Kind);
+pub(crate) type Image = (usize, usize, Kind);
 
 fn image_of(seen: &Observation) -> Image {
     (seen.sample, seen.camera, seen.kind())
@@ -81,32 +81,10 @@ pub(crate) fn judge(setup: &Setup, state: &State, left_out: &[bool], moved: &[bo
         .filter(|(_, distances)| distances.len() >= IN_IMAGE)
         .map(|(key, mut distances)| (key, median(&mut distances)))
         .collect();
-    let bad = |key: &Image| medians.get(key).is_some_and(|median| *median > IMAGE);
-    let of_sample = |sample: usize| {
-        medians.range((sample, 0, Kind::Pixels)..=(sample, usize::MAX, Kind::Points)).map(|(key, _)| *key)
-    };
-
-    let mut verdict = Verdict {
-        active: vec![true; distances.len()],
-        findings: Vec::new(),
-        moved: moved.to_vec(),
-        left_out: Vec::new(),
-    };
-    let mut wrong_joints = BTreeSet::new();
-    let mut wrong_images = BTreeSet::new();
-    for sample in (0..setup.len()).filter(|&sample| state.placed[sample]) {
-        let images: Vec<Image> = of_sample(sample).filter(|key| !verdict.moved[key.1]).collect();
-        let wrong: Vec<Image> = images.iter().copied().filter(|key| bad(key)).collect();
-        if !wrong.is_empty() && wrong.len() == images.len() {
-            wrong_joints.insert(sample);
-        } else {
-            wrong_images.extend(wrong);
-        }
-    }
-    for camera in bumped_cameras(&verdict.moved, &medians, &wrong_images) {
-        verdict.moved[camera] = true;
-        wrong_images.retain(|image| image.1 != camera);
-    }
+    let judged = (0..setup.len()).filter(|&sample| state.placed[sample]);
+    let Wrong { joints: wrong_joints, images: wrong_images, moved } = wrong(&medians, judged, moved);
+    let mut verdict =
+        Verdict { active: vec![true; distances.len()], findings: Vec::new(), moved, left_out: Vec::new() };
     let mut single = 0;
     for ((index, seen), distance) in setup.observations.iter().enumerate().zip(&distances) {
         let with_others = !state.placed[seen.sample]
@@ -125,6 +103,39 @@ pub(crate) fn judge(setup: &Setup, state: &State, left_out: &[bool], moved: &[bo
         verdict.findings.push(Finding::Outliers { count: single, of: distances.len() });
     }
     verdict
+}
+
+/// Samples, images and cameras that do not fit.
+pub(crate) struct Wrong {
+    /// Samples of which no image fits.
+    pub joints: BTreeSet<usize>,
+    /// Of the other samples.
+    pub images: BTreeSet<Image>,
+    /// Whether each camera moved.
+    pub moved: Vec<bool>,
+}
+
+/// Judges images by their median distances [yardsticks]. `judged`: the samples of which something is known; `moved`: cameras that are known to
+/// have moved.
+pub(crate) fn wrong(medians: &BTreeMap<Image, f64>, judged: impl Iterator<Item = usize>, moved: &[bool]) -> Wrong {
+    let of_sample = |sample: usize| {
+        medians.range((sample, 0, Kind::Pixels)..=(sample, usize::MAX, Kind::Points)).map(|(key, _)| *key)
+    };
+    let mut found = Wrong { joints: BTreeSet::new(), images: BTreeSet::new(), moved: moved.to_vec() };
+    for sample in judged {
+        let images: Vec<Image> = of_sample(sample).filter(|key| !moved[key.1]).collect();
+        let wrong: Vec<Image> = images.iter().copied().filter(|key| medians[key] > IMAGE).collect();
+        if !wrong.is_empty() && wrong.len() == images.len() {
+            found.joints.insert(sample);
+        } else {
+            found.images.extend(wrong);
+        }
+    }
+    for camera in bumped_cameras(moved, medians, &found.images) {
+        found.moved[camera] = true;
+        found.images.retain(|image| image.1 != camera);
+    }
+    found
 }
 
 /// About the standard deviation of a coordinate of each kind of detection, over those that are not left out [px, or m].

@@ -2,7 +2,7 @@
 use super::deviations::coordinate_of;
 use super::graph::{Priors, row};
 use super::setup::Setup;
-use crate::rig::{CameraField, JointField, Parameter, Parent};
+use crate::rig::{CameraField, JointField, Parameter, Parent, Rig};
 
 /// Where a value is given and nothing is said of how well, it is weakly known: so far off a value from a data sheet or an
 /// earlier calibration may well be.
@@ -70,6 +70,63 @@ impl Priors {
         }
         priors
     }
+}
+
+/// What is assumed of the values that a rig gives, in words: how far off they may be, by default or as its `[estimate.prior]` says.
+pub fn assumptions(rig: &Rig) -> Vec<String> {
+    let mut counts = [0; 4];
+    for parameter in rig.parameters() {
+        let is_assumed = rig.has_value(&parameter) && !rig.is_fixed(&parameter) && rig.prior_sd(&parameter).is_none();
+        let kind = match parameter {
+            Parameter::JointField { field: JointField::D | JointField::A, .. } => 0,
+            Parameter::JointField { .. } => 1,
+            Parameter::CameraPose(_) => 2,
+            Parameter::FeatureXyz(_) => 3,
+            Parameter::Base | Parameter::CameraField { .. } | Parameter::TargetPose(_) => continue,
+        };
+        counts[kind] += usize::from(is_assumed);
+    }
+    let mm = |length: f64| format!("±{:.0} mm", 1e3 * length);
+    let sds = [
+        (mm(LENGTH), "lengths of joints"),
+        (format!("±{ANGLE} rad"), "angles of joints"),
+        (format!("{} and ±{CAMERA_ANGLE} rad", mm(CAMERA_LENGTH)), "poses of cameras"),
+        (mm(LENGTH), "places of features"),
+    ];
+    let defaults = sds.into_iter().zip(counts).filter(|(_, count)| *count > 0);
+    let defaults = defaults.map(|((sd, what), count)| format!("{sd} on each of the {count} {what} that the rig gives"));
+    let stated = rig.estimate.prior.iter().map(|(path, sd)| format!("±{sd} on {path} as the rig states"));
+    defaults.chain(stated).collect()
+}
+
+/// The standard deviations of the prior around a parameter that has a value in a rig, number by number in the order of `[fit.sd]`; `None` where
+/// it has none. A lens is taken as the rig has it, so that one from a recording's header has to be filled in.
+pub(crate) fn prior_sds(rig: &Rig, parameter: &Parameter) -> Option<Vec<f64>> {
+    if !rig.has_value(parameter) {
+        return None;
+    }
+    let sd = |default: f64| rig.prior_sd(parameter).unwrap_or(default);
+    let pose = |length: f64, angle: f64| [[sd(length); 3], [sd(angle); 3]].concat();
+    Some(match *parameter {
+        Parameter::Base => pose(LENGTH, ANGLE),
+        Parameter::JointField { field: JointField::D | JointField::A, .. } => vec![sd(LENGTH)],
+        Parameter::JointField { .. } => vec![sd(ANGLE)],
+        Parameter::CameraPose(_) => pose(CAMERA_LENGTH, CAMERA_ANGLE),
+        Parameter::FeatureXyz(_) => vec![sd(LENGTH); 3],
+        Parameter::CameraField { camera, field } => {
+            let camera = &rig.cameras[camera];
+            match field {
+                CameraField::Fx => vec![sd(FOCAL * camera.fx?)],
+                CameraField::Fy => vec![sd(FOCAL * camera.fy?)],
+                CameraField::Cx | CameraField::Cy => {
+                    let side = camera.size.map_or(2.0 * camera.cx?.max(camera.cy?), |[w, h]| f64::from(w.max(h)));
+                    vec![sd(CENTRE * side)]
+                }
+                CameraField::Distortion => vec![sd(DISTORTION); camera.distortion.as_ref()?.len()],
+            }
+        }
+        Parameter::TargetPose(_) => return None,
+    })
 }
 
 fn pose(angle: f64, length: f64) -> [f64; 6] {

@@ -1,6 +1,6 @@
 //! What a calibration did and found, and how good it is.
 use super::{CameraErrors, Combination, Influence, PointErrors, TargetReport};
-use crate::rig::{Noise, Rig};
+use crate::rig::{Camera, Noise, Rig};
 
 /// A learned rig and how it came about.
 #[derive(Clone, Debug)]
@@ -140,8 +140,12 @@ impl std::fmt::Display for Finding {
                 let (leads, fits) = if *by_pose { ("tip pose does", "it fits") } else { ("joints do", "they fit") };
                 write!(f, "sample {sample}: its {leads} not lead to what the cameras saw ({off:.1})")?;
                 match swapped_with {
-                    Some(other) => write!(f, "; {fits} the images of sample {other}: the two are swapped"),
-                    None => Ok(()),
+                    Some(other) => write!(
+                        f,
+                        "; {fits} the images of sample {other}: the two are swapped, and both were left out (nothing has to be mended; to use \
+                         them, exchange what was read in them)"
+                    ),
+                    None => write!(f, "; it was left out"),
                 }
             }
             Finding::UnknownState { sample } => {
@@ -151,10 +155,17 @@ impl std::fmt::Display for Finding {
                 )
             }
             Finding::WrongImage { sample, camera, off } => {
-                write!(f, "sample {sample}: the image of camera `{camera}` belongs to another pose ({off:.1})")
+                write!(
+                    f,
+                    "sample {sample}: the image of camera `{camera}` belongs to another pose ({off:.1}); it was left out"
+                )
             }
             Finding::CameraMoved { camera, largest, sample } => {
-                write!(f, "camera `{camera}` moved during the recording: sample {sample} is {largest:.1} off")
+                write!(
+                    f,
+                    "camera `{camera}` moved during the recording: sample {sample} is {largest:.1} off; its images were \
+                     left out of the fit of all else"
+                )
             }
         }
     }
@@ -182,6 +193,8 @@ impl std::fmt::Display for Distance {
 }
 
 /// Standard deviation of the tip's position over the recorded samples, as the data leave it.
+///
+/// In words it is what follows "the tip's position is known to".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TipDeviation {
     /// Median over the samples, root of the trace of the covariance.
@@ -193,4 +206,49 @@ pub struct TipDeviation {
     pub by_data: f64,
     /// True where it is in metres; false where nothing metric is known and it is in the model's unit.
     pub metric: bool,
+}
+
+impl TipDeviation {
+    /// True where priors decide a good part of it, so that two figures are needed to tell what is known.
+    pub fn hangs_on_priors(&self) -> bool {
+        self.by_data < 0.9 * self.median
+    }
+
+    /// A length of the tip with its unit.
+    pub fn length(&self, length: f64) -> String {
+        if self.metric { format!("{:.3} mm", 1e3 * length) } else { format!("{length:.2e}") }
+    }
+}
+
+impl std::fmt::Display for TipDeviation {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [median, largest, by_data] = [self.median, self.largest, self.by_data].map(|length| self.length(length));
+        if self.hangs_on_priors() {
+            write!(f, "{by_data} by the data, and to {median} (largest {largest}) with what only priors determine")?;
+            write!(f, " (median standard deviations over the samples")?;
+        } else {
+            write!(f, "{median} (median standard deviation over the samples; largest {largest}")?;
+        }
+        write!(f, "{})", if self.metric { "" } else { "; nothing metric is known, so in the model's unit" })?;
+        if self.hangs_on_priors() {
+            write!(f, "; they differ because what pixels do not tell, above all the scale, comes only from what was ")?;
+            write!(f, "assumed of the rig")?;
+        }
+        Ok(())
+    }
+}
+
+/// How well the pose of every camera is known, with what priors say of it, in words; nothing of those whose poses are held or left open.
+pub fn camera_deviations(learned: &Rig) -> Vec<String> {
+    let of_camera = |camera: &Camera| {
+        let sd = learned.fit.as_ref()?.sd.get(&format!("cameras.{}.pose", camera.name))?;
+        let [x, y, z, turns @ ..] = sd.as_slice() else { return None };
+        let turn = turns.iter().map(|sd| sd * sd).sum::<f64>().sqrt();
+        let [mm, deg] = [1e3 * (x * x + y * y + z * z).sqrt(), turn.to_degrees()];
+        Some(format!(
+            "the pose of camera `{}` is known to {mm:.3} mm and {deg:.3}° (standard deviation, with the priors)",
+            camera.name
+        ))
+    };
+    learned.cameras.iter().filter_map(of_camera).collect()
 }

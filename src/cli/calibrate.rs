@@ -11,8 +11,8 @@ use super::words::{cameras_json, count, duration, error_table, points_json};
 use clap::Args;
 use handeye::Error;
 use handeye::calibrate::{
-    Calibration, Distance, Errors, Finding, NoiseTrial, Options, Progress, Report, TargetReport, TipDeviation,
-    calibrate, relearn, select_noise,
+    Calibration, Distance, Errors, Finding, NoiseTrial, Options, Progress, Report, TargetReport, assumptions,
+    calibrate, camera_deviations, relearn, select_noise,
 };
 use handeye::report;
 use handeye::rig::Rig;
@@ -168,9 +168,14 @@ fn describe(before: &Rig, learned_rig: &Rig, report: &Report, seconds: f64) -> S
         text += &format!("\nthe noise, estimated from the data: {}\n", noise::in_words(noise, recorded(report)));
     }
     if let Some(tip) = &report.tip {
-        text += &format!("\nthe tip's position is known to {}\n", tip_in_words(tip));
-    } else {
-        text += &trust::cameras_in_words(learned_rig);
+        text += &format!("\nthe tip's position is known to {tip}\n");
+        if tip.hangs_on_priors() {
+            text += &format!("  what was assumed: {}\n", assumptions(before).join(", "));
+        }
+    }
+    let cameras = camera_deviations(learned_rig);
+    if !cameras.is_empty() {
+        text += &format!("\n{}\n", cameras.join("\n"));
     }
     for (title, lines) in [
         ("what is known of the robot's state", report.states.clone()),
@@ -237,23 +242,6 @@ fn together(report: &Report) -> Errors {
     }
 }
 
-fn tip_in_words(tip: &TipDeviation) -> String {
-    let TipDeviation { median, largest, by_data, metric } = *tip;
-    let [median_mm, largest_mm, by_data_mm] = [median, largest, by_data].map(|length| 1e3 * length);
-    if metric && by_data < 0.9 * median {
-        return format!(
-            "{by_data_mm:.3} mm by the data (median standard deviation over the samples), and to {median_mm:.3} mm (largest \
-             {largest_mm:.3} mm) with what only priors determine"
-        );
-    }
-    if metric {
-        return format!("{median_mm:.3} mm (median standard deviation over the samples; largest {largest_mm:.3} mm)");
-    }
-    format!(
-        "{median:.2e} (median standard deviation over the samples, largest {largest:.2e}; nothing metric is known, so in the model's unit)"
-    )
-}
-
 /// How a rig was learned, as the one object of `--json`.
 pub fn report_json(report: &Report) -> Value {
     let stage = |stage: &handeye::calibrate::StageReport| {
@@ -302,7 +290,8 @@ fn with(mut json: Value, name: &str, distance: &Distance) -> Value {
     json
 }
 
-fn finding_json(finding: &Finding) -> Value {
+/// A finding, with its words.
+pub fn finding_json(finding: &Finding) -> Value {
     let mut json = match finding {
         Finding::UnseenCamera { camera } => json!({ "kind": "unseen_camera", "camera": camera }),
         Finding::Misfit { ratio, stated } => with(json!({ "kind": "misfit", "ratio": ratio }), "stated", stated),

@@ -1,21 +1,16 @@
 //! `handeye evaluate`: how well a rig predicts a recording.
 use super::answer::Answer;
+use super::calibrate::finding_json;
 use super::inputs::{check_output, read_recordings, read_rig, write_output};
 use super::reading::Reading;
-use super::words::{cameras_json, count, error_table, errors_json, mm, px};
+use super::words::{cameras_json, count, error_table, errors_json};
 use clap::Args;
 use handeye::Error;
 use handeye::calibrate::{Evaluation, evaluate};
-use handeye::report::evaluation_html;
+use handeye::report::{evaluation_html, evaluation_steps};
+use handeye::rig::Rig;
 use serde_json::{Value, json};
 use std::path::PathBuf;
-
-/// Samples whose median distance exceeds this many times that of all are named: with Gaussian noise and a dozen detections
-/// in a sample, one in a million does.
-const CONSPICUOUS: f64 = 3.0;
-
-/// Most samples that are named.
-const NAMED: usize = 5;
 
 /// Predict the pixels and points of a recording from its joints, and compare
 ///
@@ -54,7 +49,7 @@ impl Evaluate {
             let page = evaluation_html(&title, &input.rig, &recording, &evaluation)?;
             write_output(path, &page)?;
         }
-        Ok(Answer::new(text(&evaluation), json(&evaluation)))
+        Ok(Answer::new(text(&input.rig, &evaluation), json(&evaluation)))
     }
 }
 
@@ -69,11 +64,15 @@ pub fn json(evaluation: &Evaluation) -> Value {
         let medians = evaluation.sample_median_m.iter().map(|median| median.map(|m| 1e3 * m));
         object.insert("sample_median_mm".to_owned(), medians.collect());
     }
+    let mut fitting = errors_json(&evaluation.fitting.total);
+    fitting.insert("cameras".to_owned(), cameras_json(&evaluation.fitting.cameras));
+    object.insert("without_what_does_not_fit".to_owned(), Value::Object(fitting));
+    object.insert("findings".to_owned(), evaluation.fitting.findings.iter().map(finding_json).collect());
     Value::Object(object)
 }
 
-fn text(evaluation: &Evaluation) -> String {
-    let Evaluation { samples, rejected, total, cameras, sample_median_px, sample_median_m } = evaluation;
+fn text(rig: &Rig, evaluation: &Evaluation) -> String {
+    let Evaluation { samples, rejected, total, cameras, fitting, .. } = evaluation;
     let mut text = format!("predicted {} of {}\n\n", count(total.observations, "detection"), count(*samples, "sample"));
     text += &error_table(cameras, total, *rejected).to_string();
     if *rejected > 0 {
@@ -85,23 +84,12 @@ fn text(evaluation: &Evaluation) -> String {
     if total.behind > 0 {
         text += &format!("\n{} predicted behind the camera\n", count(total.behind, "detection"));
     }
-    let pixels = conspicuous(sample_median_px, total.median_px, |median| format!("{} px", px(median)));
-    let points = conspicuous(sample_median_m, total.points.median_m, |median| format!("{} mm", mm(median)));
-    text + &pixels + &points
-}
-
-/// The samples that are far from what is predicted, and how far. `usual`: the median of all.
-fn conspicuous(medians: &[Option<f64>], usual: f64, in_words: impl Fn(f64) -> String) -> String {
-    let pair = |(sample, median): (usize, &Option<f64>)| median.map(|median| (sample, median));
-    let mut far: Vec<(usize, f64)> = medians.iter().enumerate().flat_map(pair).collect();
-    far.retain(|(_, median)| *median > CONSPICUOUS * usual);
-    far.sort_by(|a, b| b.1.total_cmp(&a.1));
-    if far.is_empty() {
-        return String::new();
+    if !fitting.findings.is_empty() {
+        let left_out: usize = fitting.cameras.iter().map(|camera| camera.rejected).sum();
+        text += "\nwithout what does not fit, as calibrate leaves it out:\n\n";
+        text += &error_table(&fitting.cameras, &fitting.total, left_out).to_string();
+        text += "\nwhat does not fit:\n";
+        fitting.findings.iter().for_each(|finding| text += &format!("  {finding}\n"));
     }
-    let mut text = format!("\n{} far from what is predicted:\n", count(far.len(), "sample"));
-    for (sample, median) in far.into_iter().take(NAMED) {
-        text += &format!("  sample {sample}: {} in the median\n", in_words(median));
-    }
-    text
+    text + &format!("\nnext: {}\n", evaluation_steps(rig, evaluation).join("\n      "))
 }

@@ -2,7 +2,6 @@
 use super::table::Table;
 use super::words::{mm, px};
 use handeye::calibrate::{Combination, DeterminedBy, Influence, Report, most_influential, worst_fitting};
-use handeye::rig::Rig;
 use serde_json::{Value, json};
 
 /// Samples that are listed.
@@ -36,25 +35,6 @@ pub fn text(report: &Report) -> String {
             table.row(row.chain(has_points.then(|| mm(rms_points_m))));
         }
         text += &format!("\n{title} (numbered from 0):\n{table}");
-    }
-    text
-}
-
-/// How well the cameras' poses are known, for rigs whose tip is known beforehand.
-pub fn cameras_in_words(learned: &Rig) -> String {
-    let mut text = String::new();
-    for camera in &learned.cameras {
-        let sd = learned.fit.as_ref().and_then(|fit| fit.sd.get(&format!("cameras.{}.pose", camera.name)));
-        let Some([x, y, z, turns @ ..]) = sd.map(Vec::as_slice) else { continue };
-        let turn = turns.iter().map(|sd| sd * sd).sum::<f64>().sqrt();
-        let [mm, deg] = [1e3 * (x * x + y * y + z * z).sqrt(), turn.to_degrees()];
-        text += &format!(
-            "\nthe pose of camera `{}` is known to {mm:.3} mm and {deg:.3}° (standard deviation)",
-            camera.name
-        );
-    }
-    if !text.is_empty() {
-        text.push('\n');
     }
     text
 }

@@ -1,9 +1,11 @@
 //! The page of a calibration.
 use super::page::Page;
 use super::sections::WORST;
-use super::{arm, residuals, sections, values};
+use super::{arm, combinations, noise, residuals, sections, values, verdict};
 use crate::Error;
-use crate::calibrate::{Calibration, DeterminedBy, Finding, SuggestOptions, SuggestedSample, Suggestion, suggest};
+use crate::calibrate::{
+    Calibration, DeterminedBy, Finding, SuggestOptions, SuggestedSample, Suggestion, camera_deviations, suggest,
+};
 use crate::recording::Recording;
 use crate::rig::Rig;
 
@@ -50,9 +52,11 @@ pub fn html(subject: &Subject<'_>) -> Result<String, Error> {
     let rig = &subject.calibration.rig;
     let residuals = residuals(rig, subject.recording)?;
     let mut page = Page::new(subject.title);
+    verdict::section(&mut page, subject, &residuals);
     summary(&mut page, subject);
     sections::cameras(&mut page, rig, &subject.calibration.report.cameras, &residuals);
-    sections::histogram_of(&mut page, rig, &residuals);
+    let report = &subject.calibration.report;
+    noise::section(&mut page, rig, &residuals, &report.findings);
     sections::worst(&mut page, rig, &residuals);
     sections::coverage(&mut page, rig, subject.recording);
     arm::view(&mut page, rig, subject.recording, arm::Shown::Few)?;
@@ -80,15 +84,15 @@ fn summary(page: &mut Page, subject: &Subject<'_>) {
         figures.push((figure, "root mean square of the distances of depth cameras' points"));
     }
     if let Some(tip) = report.tip {
-        let figure = if tip.metric { format!("{:.3} mm", 1e3 * tip.median) } else { format!("{:.1e}", tip.median) };
-        figures.push((
-            figure,
-            if tip.metric {
-                "standard deviation of the tip's position"
-            } else {
-                "standard deviation of the tip's position, in the model's unit: nothing metric is known"
-            },
-        ));
+        if tip.hangs_on_priors() {
+            figures.push((tip.length(tip.by_data), "standard deviation of the tip's position by the data alone"));
+            figures.push((tip.length(tip.median), "the same with what only priors determine"));
+        } else {
+            figures.push((tip.length(tip.median), "standard deviation of the tip's position"));
+        }
+        if !tip.metric {
+            figures.push(("no unit".to_owned(), "of lengths: nothing metric is known"));
+        }
     }
     figures.extend([
         (report.samples.to_string(), "samples"),
@@ -100,10 +104,11 @@ fn summary(page: &mut Page, subject: &Subject<'_>) {
         page.paragraph("No minimum was reached: what stands below is not to be relied on.");
     }
     page.list(&report.states);
+    page.list(&camera_deviations(&subject.calibration.rig));
     if report.findings.is_empty() {
         page.paragraph("Nothing in the recording stands out as wrong.");
     } else {
-        page.paragraph("What does not fit:");
+        page.paragraph("What does not fit; none of the figures above count what was left out:");
         page.list(&report.findings.iter().map(Finding::to_string).collect::<Vec<_>>());
     }
 }
@@ -119,7 +124,6 @@ fn open(page: &mut Page, subject: &Subject<'_>) {
     page.list(&report.gauge);
     let metric = report.tip.is_some_and(|tip| tip.metric);
     let row = |combination: &crate::calibrate::Combination| {
-        let numbers = combination.numbers.iter().map(|(path, share)| format!("{share:+.2} {path}"));
         let by = match combination.determined_by {
             DeterminedBy::Nothing => "nothing".to_owned(),
             DeterminedBy::Prior(ratio) if ratio.is_finite() => format!("its prior, {ratio:.0} times the data"),
@@ -129,7 +133,7 @@ fn open(page: &mut Page, subject: &Subject<'_>) {
         let tip = combination.tip.map_or("unbounded".to_owned(), |tip| {
             if metric { format!("{:.3} mm", 1e3 * tip) } else { format!("{tip:.1e}") }
         });
-        vec![numbers.collect::<Vec<_>>().join(", "), by, tip, combination.cure.clone()]
+        vec![combinations::together(&subject.calibration.rig, &combination.numbers), by, tip, combination.cure.clone()]
     };
     let rows: Vec<Vec<String>> = report.weak.iter().map(row).collect();
     if !rows.is_empty() {
@@ -163,10 +167,19 @@ fn suggested(page: &mut Page, subject: &Subject<'_>) {
     let length =
         |length: f64| if suggestion.metric { format!("{:.3} mm", 1e3 * length) } else { format!("{length:.2e}") };
     page.section("suggested", "Where to move next");
+    let of_samples = subject.calibration.report.tip.map(|tip| {
+        format!(
+            " (in the median over the recorded samples, as it stands at the top, it is {})",
+            tip.length(tip.by_data)
+        )
+    });
     page.paragraph(&format!(
         "Joint positions that would shrink the uncertainty of the tip most, the most valuable first; obstacles are not known. Now it is known \
-         to {} by the data, in the median over the workspace.",
-        length(suggestion.now)
+         to {} by the data, and to {} with what only priors determine, in the median over the whole workspace of the arm{}. More motions \
+         shrink what the data leave, and hardly what comes from priors.",
+        length(suggestion.now),
+        length(suggestion.with_priors),
+        of_samples.unwrap_or_default()
     ));
     let joints = &subject.calibration.rig.robot.joints;
     let row = |(number, sample): (usize, &SuggestedSample)| {
@@ -209,26 +222,6 @@ fn stages(page: &mut Page, subject: &Subject<'_>) {
 
 /// What a reader may do.
 fn next(page: &mut Page, subject: &Subject<'_>) {
-    let report = &subject.calibration.report;
-    let mut steps = Vec::new();
-    if !report.converged {
-        steps.push(
-            "Record more varied motions, or give what is known in a rig file: the fit has not settled.".to_owned(),
-        );
-    }
-    if !report.findings.is_empty() {
-        steps.push(
-            "Look at what does not fit, above: mend the recording or the rig where it is a mistake, and learn again."
-                .to_owned(),
-        );
-    }
-    let cures = report
-        .weak
-        .iter()
-        .filter(|weak| !weak.cure.is_empty())
-        .map(|weak| format!("To determine more: {}.", weak.cure));
-    steps.extend(cures.take(3));
-    steps.push("Judge the rig on samples that it has not seen: handeye evaluate.".to_owned());
     page.section("next", "What to do next");
-    page.list(&steps);
+    page.list(&verdict::steps(subject));
 }

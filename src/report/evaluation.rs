@@ -1,14 +1,18 @@
 //! The page of an evaluation.
 use super::page::Page;
 use super::residuals::of_predictions;
-use super::{arm, sections};
+use super::{arm, noise, sections};
 use crate::Error;
-use crate::calibrate::{CameraErrors, Evaluation};
+use crate::calibrate::{CameraErrors, Evaluation, Finding};
 use crate::recording::Recording;
 use crate::rig::Rig;
 
 /// A rig that was fitted well predicts what it has not seen within this many times its own residuals.
 const WORSE: f64 = 1.5;
+
+/// A camera is off only where all together are further off than this many times what they were: each has its own usual error, of which a rig
+/// file does not tell.
+const TOGETHER: f64 = 1.1;
 
 /// The page of how well a rig predicts a recording. `title` stands at the top.
 ///
@@ -23,21 +27,25 @@ pub fn evaluation_html(
     let mut page = Page::new(title);
     summary(&mut page, rig, evaluation);
     sections::cameras(&mut page, rig, &evaluation.cameras, &residuals);
-    sections::histogram_of(&mut page, rig, &residuals);
+    noise::section(&mut page, rig, &residuals, &evaluation.fitting.findings);
     sections::worst(&mut page, rig, &residuals);
     sections::coverage(&mut page, rig, recording);
     arm::view(&mut page, rig, recording, arm::Shown::Few)?;
-    next(&mut page, rig, evaluation);
+    page.section("next", "What to do next");
+    page.list(&evaluation_steps(rig, evaluation));
     Ok(page.finish())
 }
 
 /// How well it predicts, beside how well it was fitted.
 fn summary(page: &mut Page, rig: &Rig, evaluation: &Evaluation) {
-    let Evaluation { samples, rejected, total, .. } = evaluation;
+    let Evaluation { samples, rejected, total, fitting, .. } = evaluation;
     page.section("summary", "How well it predicts");
     let mut figures = Vec::new();
     if total.observations > total.points.observations {
         figures.push((format!("{:.3} px", total.rms_px), "root mean square of the pixel distances"));
+        if !fitting.findings.is_empty() {
+            figures.push((format!("{:.3} px", fitting.total.rms_px), "the same without what does not fit"));
+        }
         figures.push((format!("{:.3} px", total.median_px), "median pixel distance"));
         let fitted = rig.fit.as_ref().filter(|fit| fit.rms_px > 0.0);
         figures.extend(
@@ -57,21 +65,34 @@ fn summary(page: &mut Page, rig: &Rig, evaluation: &Evaluation) {
     if *rejected > 0 {
         page.paragraph("Left out is what the rig does not know the feature or camera of, and what has neither joints nor a tip pose.");
     }
+    if !fitting.findings.is_empty() {
+        page.paragraph("What does not fit:");
+        page.list(&fitting.findings.iter().map(Finding::to_string).collect::<Vec<_>>());
+    }
     if total.behind > 0 {
         page.paragraph(&format!("{} detections are predicted behind their camera.", total.behind));
     }
 }
 
-/// What a reader may do.
-fn next(page: &mut Page, rig: &Rig, evaluation: &Evaluation) {
+/// What a reader may do, in sentences; judged without what does not fit.
+pub fn evaluation_steps(rig: &Rig, evaluation: &Evaluation) -> Vec<String> {
+    let fitting = &evaluation.fitting;
     let fit = rig.fit.as_ref();
     let usual_px = fit.map(|fit| fit.rms_px).filter(|px| *px > 0.0);
     let usual_m = fit.and_then(|fit| fit.rms_points_m).filter(|m| *m > 0.0);
-    let exceeds = |found: f64, usual: Option<f64>| usual.is_some_and(|usual| found > WORSE * usual);
-    let is_off = |camera: &&CameraErrors| {
-        exceeds(camera.errors.rms_px, usual_px) || exceeds(camera.errors.points.rms_m, usual_m)
+    let is_beyond = |found: f64, usual: Option<f64>, times: f64| usual.is_some_and(|usual| found > times * usual);
+    let total = &fitting.total;
+    let exceeds_px = |px: f64| is_beyond(total.rms_px, usual_px, TOGETHER) && is_beyond(px, usual_px, WORSE);
+    let exceeds_m = |m: f64| is_beyond(total.points.rms_m, usual_m, TOGETHER) && is_beyond(m, usual_m, WORSE);
+    let moved = |name: &str| {
+        let is_it = |finding: &Finding| matches!(finding, Finding::CameraMoved { camera, .. } if camera == name);
+        fitting.findings.iter().any(is_it)
     };
-    let off: Vec<&CameraErrors> = evaluation.cameras.iter().filter(is_off).collect();
+    let is_off = |camera: &&CameraErrors| {
+        let errors = &camera.errors;
+        moved(&camera.name) || exceeds_px(errors.rms_px) || exceeds_m(errors.points.rms_m)
+    };
+    let off: Vec<&CameraErrors> = fitting.cameras.iter().filter(is_off).collect();
     let seeing = evaluation.cameras.iter().filter(|camera| camera.errors.observations > 0).count();
     let mut steps = Vec::new();
     if !off.is_empty() && off.len() == seeing && seeing > 1 {
@@ -90,14 +111,25 @@ fn next(page: &mut Page, rig: &Rig, evaluation: &Evaluation) {
         };
         steps.extend(off.into_iter().map(words));
     }
+    let mistakes = |finding: &Finding| {
+        matches!(finding, Finding::WrongJoints { .. } | Finding::WrongImage { .. } | Finding::Outliers { .. })
+    };
+    let has_mistakes = fitting.findings.iter().any(mistakes);
     if steps.is_empty() {
-        let words = if usual_px.or(usual_m).is_some() {
-            "It predicts these samples about as well as those that it was learned from: nothing needs to be done."
+        let besides = if has_mistakes { "Without what does not fit, it" } else { "It" };
+        steps.push(if usual_px.or(usual_m).is_some() {
+            format!("{besides} predicts these samples about as well as those that it was learned from: nothing needs to be done.")
         } else {
             "The rig does not say what it was learned from; compare the distances with the noise of the detector."
-        };
-        steps.push(words.to_owned());
+                .to_owned()
+        });
     }
-    page.section("next", "What to do next");
-    page.list(&steps);
+    if has_mistakes {
+        steps.push(
+            "The samples, images and detections that are named as not fitting are far off while the rest fits: they are mistakes of the \
+             recording rather than of the rig. Look at these images; the figures without them are those of the rig."
+                .to_owned(),
+        );
+    }
+    steps
 }

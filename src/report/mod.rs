@@ -2,14 +2,17 @@
 mod arm;
 mod calibration;
 mod charts;
+mod combinations;
 mod evaluation;
+mod noise;
 mod page;
 mod residuals;
 mod sections;
 mod servo;
 mod values;
+mod verdict;
 
 pub use calibration::{ExtraTable, Subject, html, suggestion};
-pub use evaluation::evaluation_html;
+pub use evaluation::{evaluation_html, evaluation_steps};
 pub use residuals::{Residual, residuals};
 pub use servo::servo_html;

@@ -100,7 +100,7 @@ impl Page {
         let data = data.replace("</", "<\\/");
         let _ = writeln!(
             self.body,
-            "<figure><canvas id=\"view\" width=\"900\" height=\"560\" tabindex=\"0\" role=\"img\" aria-label=\"{caption}\"></canvas>\
+            "<figure><canvas id=\"view\" width=\"1080\" height=\"756\" tabindex=\"0\" role=\"img\" aria-label=\"{caption}\"></canvas>\
              <figcaption>{caption}</figcaption></figure>\n<script id=\"view-data\" type=\"application/json\">{data}</script>\n\
              <script>\n{SCRIPT}</script>",
             caption = escaped(caption)

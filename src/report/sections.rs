@@ -1,5 +1,5 @@
 //! Sections that several pages share: how well a rig predicts a recording.
-use super::charts::{Strip, histogram, map, scatter, strips};
+use super::charts::{Strip, map, scatter, strips};
 use super::page::Page;
 use super::residuals::Residual;
 use crate::calibrate::{CameraErrors, median};
@@ -50,7 +50,7 @@ pub(super) fn cameras(page: &mut Page, rig: &Rig, cameras: &[CameraErrors], resi
 }
 
 /// Standard deviation of a coordinate in every camera of a rig, from the median distance of Gaussian residuals [px].
-fn scales(rig: &Rig, residuals: &[Residual]) -> Vec<f64> {
+pub(super) fn scales(rig: &Rig, residuals: &[Residual]) -> Vec<f64> {
     let of = |camera: usize| {
         let own = residuals.iter().filter(|residual| residual.camera == camera);
         (median(&mut own.map(Residual::distance).collect::<Vec<_>>()) / (2.0 * std::f64::consts::LN_2).sqrt()).max(1e-6)
@@ -62,22 +62,6 @@ fn scales(rig: &Rig, residuals: &[Residual]) -> Vec<f64> {
 fn extent(residuals: &[&Residual]) -> [f64; 2] {
     let most = |axis: usize| residuals.iter().map(|residual| residual.seen[axis]).fold(1.0, f64::max);
     [most(0), most(1)]
-}
-
-/// The distances beside what Gaussian noise of their own size gives.
-pub(super) fn histogram_of(page: &mut Page, rig: &Rig, residuals: &[Residual]) {
-    if residuals.is_empty() {
-        return;
-    }
-    let sds = scales(rig, residuals);
-    let over_sd = |residual: &Residual| residual.error.map(|error| error / sds[residual.camera]);
-    let coordinates: Vec<f64> = residuals.iter().flat_map(over_sd).collect();
-    let gaussian = |x: f64| (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt();
-    page.section("histogram", "Are the errors noise?");
-    page.drawing(
-        &histogram(&coordinates, [-5.0, 5.0], 50, Some(&gaussian)),
-        "residual coordinates over the standard deviation of their camera, and the curve that noise alone would give; what lies beyond 5 is counted at the ends",
-    );
 }
 
 /// The samples that are worst as a whole, with their images: a single wrong detection does not make one.

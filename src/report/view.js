@@ -6,29 +6,77 @@
   let yaw = 0.8, pitch = 0.45, zoom = 1, now = 0;
   const current = (states) => states[Math.min(now, states.length - 1)];
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  const place = ([x, y, z]) => {
+  // Whatever is drawn at any moment, so that the size does not change while it plays.
+  const all = [scene.arms, scene.features, [scene.tips], scene.cameras.map((of) => of.flatMap((camera) => camera.lines.flat())), scene.axes]
+    .flat(2).filter((point) => point.length === 3);
+  const ratio = () => canvas.width / Math.max(1, canvas.clientWidth);
+  const turned = ([x, y, z]) => {
     const [u, v, w] = [x - scene.centre[0], y - scene.centre[1], z - scene.centre[2]];
-    const right = -Math.sin(yaw) * u + Math.cos(yaw) * v;
     const away = Math.cos(yaw) * u + Math.sin(yaw) * v;
-    const up = Math.cos(pitch) * w - Math.sin(pitch) * away;
-    const scale = zoom * 0.42 * Math.min(canvas.width, canvas.height) / scene.radius;
-    return [canvas.width / 2 + scale * right, canvas.height / 2 - scale * up];
+    return [-Math.sin(yaw) * u + Math.cos(yaw) * v, Math.cos(pitch) * w - Math.sin(pitch) * away];
+  };
+  // From what is turned to the canvas, filling it but for a margin.
+  let fit = { scale: 1, centre: [0, 0] };
+  const fitted = () => {
+    const points = all.map(turned);
+    const range = (axis) => points.reduce(([least, most], point) => [Math.min(least, point[axis]), Math.max(most, point[axis])], [Infinity, -Infinity]);
+    const [across, up] = [range(0), range(1)];
+    const size = ([least, most]) => Math.max(most - least, 1e-3 * scene.radius);
+    const scale = zoom * 0.84 * Math.min(canvas.width / size(across), canvas.height / size(up));
+    fit = { scale, centre: [across, up].map(([least, most]) => (least + most) / 2) };
+  };
+  const place = (point) => {
+    const [right, up] = turned(point);
+    return [canvas.width / 2 + fit.scale * (right - fit.centre[0]), canvas.height / 2 - fit.scale * (up - fit.centre[1])];
   };
   const path = (points, style, width) => {
     context.beginPath();
     points.map(place).forEach(([x, y], index) => (index ? context.lineTo(x, y) : context.moveTo(x, y)));
     context.strokeStyle = style;
-    context.lineWidth = width;
+    context.lineWidth = width * ratio();
     context.stroke();
   };
   const dot = (point, radius, style) => {
     const [x, y] = place(point);
     context.beginPath();
-    context.arc(x, y, radius, 0, 2 * Math.PI);
+    context.arc(x, y, radius * ratio(), 0, 2 * Math.PI);
     context.fillStyle = style;
     context.fill();
   };
+  // Names beside their cameras, each moved down until it covers none before it, with a line to where it belongs.
+  const label = (cameras) => {
+    const height = 16 * ratio();
+    context.font = `600 ${14 * ratio()}px system-ui, sans-serif`;
+    const boxes = [];
+    const places = cameras.map((camera) => [camera.name, place(camera.lines[0][0])]).sort((a, b) => a[1][1] - b[1][1]);
+    places.forEach(([name, [x, y]]) => {
+      const width = context.measureText(name).width;
+      const box = { name, x: Math.max(0, Math.min(x + 10 * ratio(), canvas.width - width)), y: Math.max(height, y - 6 * ratio()), width, height };
+      const covered = (other) => box.x < other.x + other.width && other.x < box.x + box.width && Math.abs(box.y - other.y) < height;
+      for (let hit = boxes.find(covered); hit; hit = boxes.find(covered)) box.y = hit.y + height;
+      boxes.push(box);
+      context.beginPath();
+      context.moveTo(x, y);
+      context.lineTo(box.x, box.y - height / 3);
+      context.strokeStyle = colour("--soft");
+      context.lineWidth = ratio();
+      context.stroke();
+      context.lineWidth = 4 * ratio();
+      context.strokeStyle = colour("--panel");
+      context.strokeText(name, box.x, box.y);
+      context.fillStyle = colour("--ink");
+      context.fillText(name, box.x, box.y);
+    });
+    canvas.labels = boxes;
+  };
   const draw = () => {
+    // As many pixels as the screen has.
+    const width = Math.max(1, Math.round(canvas.clientWidth * (window.devicePixelRatio || 1)));
+    if (canvas.width !== width) {
+      canvas.width = width;
+      canvas.height = Math.round(0.7 * width);
+    }
+    fitted();
     context.clearRect(0, 0, canvas.width, canvas.height);
     scene.tips.forEach((tip) => dot(tip, 2, colour("--line")));
     const others = scene.moves ? [scene.arms[0]] : scene.arms;
@@ -37,12 +85,9 @@
     current(scene.features).forEach((feature) => dot(feature, 3, colour("--warn")));
     current(scene.cameras).forEach((camera) => {
       camera.lines.forEach((line) => path(line, colour("--good"), 1.5));
-      const [x, y] = place(camera.lines[0][0]);
-      context.fillStyle = colour("--ink");
-      context.font = "14px system-ui, sans-serif";
-      context.fillText(camera.name, x + 8, y - 6);
     });
     scene.axes.forEach((axis, index) => path(axis, ["#d33", "#3a3", "#36c"][index], 2));
+    label(current(scene.cameras));
   };
   let held = null;
   canvas.addEventListener("pointerdown", (event) => { held = [event.clientX, event.clientY]; canvas.setPointerCapture(event.pointerId); });
@@ -64,6 +109,7 @@
     draw();
   });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+  addEventListener("resize", draw);
   document.addEventListener("moment", (event) => { now = event.detail; draw(); });
   draw();
 })();

@@ -5,6 +5,20 @@ use std::process::Command;
 
 /// What the browser is asked: it writes its answer into the page.
 const CHECK: &str = "<script>
+const extent = (canvas, pixels) => {
+  const [across, up] = [new Set(), new Set()];
+  pixels.forEach((value, index) => {
+    if (index % 4 !== 3 || value === 0) return;
+    const pixel = (index - 3) / 4;
+    across.add(pixel % canvas.width);
+    up.add(Math.floor(pixel / canvas.width));
+  });
+  const range = (set) => [...set].reduce(([least, most], x) => [Math.min(least, x), Math.max(most, x)], [Infinity, -Infinity]);
+  const share = (set, size) => (range(set)[1] - range(set)[0]) / size;
+  const filled = Math.max(share(across, canvas.width), share(up, canvas.height));
+  const width = canvas.getBoundingClientRect().width / document.querySelector('main').clientWidth;
+  return { filled, width, sharp: canvas.width >= canvas.clientWidth };
+};
 addEventListener('load', () => {
   const root = document.documentElement;
   const canvas = document.getElementById('view');
@@ -26,6 +40,9 @@ addEventListener('load', () => {
     empty: empty.length,
     drawn: pixels.some((value) => value > 0),
     plays: places && places[0].every((place, index) => place !== places[1][index]) && document.getElementById('play').textContent === 'pause',
+    view: canvas && extent(canvas, pixels),
+    overlaps: canvas && canvas.labels.some((a, i) => canvas.labels.slice(i + 1).some((b) =>
+      a.x < b.x + b.width && b.x < a.x + a.width && Math.abs(a.y - b.y) < a.height - 1)),
     ink: getComputedStyle(document.body).color,
   });
 });
@@ -100,6 +117,10 @@ impl Pages {
                 "{width} px wide: {answer}"
             );
             assert!(answer["drawings"].as_u64().unwrap() >= drawings && answer["empty"] == 0, "{answer}");
+            // As wide as the page but for its margins, filled, with a pixel for every one of the screen, and names that can be read.
+            let view = &answer["view"];
+            assert!(view["filled"].as_f64().unwrap() > 0.75 && view["width"].as_f64().unwrap() > 0.85, "{answer}");
+            assert_eq!((&view["sharp"], &answer["overlaps"]), (&true.into(), &false.into()), "{answer}");
             inks.push(answer["ink"].clone());
             assert_eq!(answer["plays"], serde_json::json!(plays), "{answer}");
         }

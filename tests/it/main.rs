@@ -35,6 +35,7 @@ mod readme;
 mod recording_files;
 mod relearn;
 mod report;
+mod report_answers;
 mod rig_files;
 mod servo;
 mod servo_every_limit;

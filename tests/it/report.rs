@@ -12,6 +12,7 @@ use std::path::Path;
 
 /// Headings of a page from nothing but a recording.
 const SECTIONS: &[&str] = &[
+    "In short",
     "How good it is",
     "Cameras",
     "Are the errors noise?",

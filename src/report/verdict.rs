@@ -1,0 +1,117 @@
+//! The answer in three lines: how well a rig fits, how well its tip is known, and what to do first.
+use super::calibration::Subject;
+use super::noise;
+use super::page::Page;
+use super::residuals::Residual;
+use crate::calibrate::{Finding, Report, assumptions};
+
+/// Said where errors do not look like noise.
+const OTHER_THAN_NOISE: &str =
+    " The errors are not noise alone (see below), so what is given by the data is less certain than the figures say.";
+
+/// The first section of a page.
+pub(super) fn section(page: &mut Page, subject: &Subject<'_>, residuals: &[Residual]) {
+    page.section("verdict", "In short");
+    let next = steps(subject).into_iter().next().unwrap_or_default();
+    let is_noise = noise::is_alone(&subject.calibration.rig, residuals, &subject.calibration.report.findings);
+    let fit = fit(subject) + if is_noise { "" } else { OTHER_THAN_NOISE };
+    page.list(&[fit, tip(subject), format!("What to do next: {next}")]);
+}
+
+/// How well it fits, beside what the noise lets expect, and what was left out.
+fn fit(subject: &Subject<'_>) -> String {
+    let Report { observations, points, rejected, rms_px, .. } = subject.calibration.report;
+    let report = &subject.calibration.report;
+    let noise = &subject.calibration.rig.noise;
+    let mut parts = Vec::new();
+    if let Some(targets) = &report.targets {
+        parts.push(format!("{:.3} mm and {:.4}° rms per axis", 1e3 * targets.rms_xyz, targets.rms_rot.to_degrees()));
+    } else if observations > points.observations {
+        // Two coordinates make a distance.
+        let expected = noise.pixels * f64::sqrt(2.0);
+        parts.push(format!(
+            "{rms_px:.3} px rms, where noise of {} px a coordinate gives {expected:.3} px",
+            noise.pixels
+        ));
+    }
+    if points.observations > 0 {
+        let (rms, sd) = (1e3 * points.rms_m, 1e3 * noise.points);
+        parts.push(format!("{rms:.3} mm rms, where noise of {sd} mm a coordinate gives {:.3} mm", sd * f64::sqrt(3.0)));
+    }
+    let left_out = match rejected {
+        0 => "nothing was left out".to_owned(),
+        _ => format!("{rejected} of {} detections were left out{}", rejected + observations, among(&report.findings)),
+    };
+    let settled = if report.converged { "" } else { " No minimum was reached, so none of this is to be relied on." };
+    format!("It fits to {}; {left_out}.{settled}", parts.join(" and "))
+}
+
+/// What is behind detections that were left out.
+fn among(findings: &[Finding]) -> String {
+    let count = |is: fn(&Finding) -> bool| findings.iter().filter(|finding| is(finding)).count();
+    let kinds = [
+        (count(|finding| matches!(finding, Finding::WrongJoints { .. } | Finding::UnknownState { .. })), "sample"),
+        (count(|finding| matches!(finding, Finding::WrongImage { .. })), "image"),
+        (count(|finding| matches!(finding, Finding::CameraMoved { .. })), "camera that moved"),
+    ];
+    let words = |(n, what): (usize, &str)| {
+        let plural = what.strip_suffix(" that moved").map_or(format!("{what}s"), |what| format!("{what}s that moved"));
+        (n > 0).then(|| format!("{n} whole {}", if n == 1 { what.to_owned() } else { plural }))
+    };
+    let words: Vec<String> = kinds.into_iter().filter_map(words).collect();
+    if words.is_empty() { String::new() } else { format!(", among them {}", words.join(" and ")) }
+}
+
+/// How well the tip's position is known, and from what.
+fn tip(subject: &Subject<'_>) -> String {
+    let Some(tip) = subject.calibration.report.tip else {
+        return "Of the tip's position nothing was learned, or the recording leaves it open.".to_owned();
+    };
+    let unit =
+        if tip.metric { "" } else { " in the model's unit, since nothing metric is known: lengths have no unit" };
+    if !tip.hangs_on_priors() {
+        return format!(
+            "The tip's position is known to {}{unit} by the data (one standard deviation, median over the samples).",
+            tip.length(tip.median)
+        );
+    }
+    format!(
+        "The tip's position is known to {}{unit} by the data alone, and to {} with the priors (one standard deviation, median over the \
+         samples): what pixels do not tell, above all the scale, comes only from what was assumed of the rig, which is {}. The frames of base \
+         and tip are taken as they are.",
+        tip.length(tip.by_data),
+        tip.length(tip.median),
+        assumptions(subject.before).join(", ")
+    )
+}
+
+/// What a reader may do, the most urgent first.
+pub(super) fn steps(subject: &Subject<'_>) -> Vec<String> {
+    let report = &subject.calibration.report;
+    let mut steps = Vec::new();
+    if !report.converged {
+        steps.push(
+            "Record more varied motions, or give what is known in a rig file: the fit has not settled.".to_owned(),
+        );
+    }
+    let misfit = |finding: &Finding| matches!(finding, Finding::Misfit { .. });
+    steps.extend(report.findings.iter().filter(|one| misfit(one)).map(|one| format!("Find the reason: {one}.")));
+    // Combinations that differ in little ask for the same.
+    let mut cures: Vec<&str> = Vec::new();
+    for cure in report.weak.iter().map(|weak| weak.cure.as_str()).filter(|cure| !cure.is_empty()) {
+        let what = |cure: &str| cure.split(": it is known").next().map(str::to_owned);
+        if cures.iter().all(|other| what(other) != what(cure)) {
+            cures.push(cure);
+        }
+    }
+    steps.extend(cures.into_iter().take(3).map(|cure| format!("To determine more: {cure}.")));
+    if report.findings.iter().any(|finding| !misfit(finding)) {
+        steps.push(
+            "What does not fit was left out, so nothing has to be mended before the rig is used; to use it too, mend the recording where it \
+             is a mistake, and learn again."
+                .to_owned(),
+        );
+    }
+    steps.push("Judge the rig on samples that it has not seen: handeye evaluate.".to_owned());
+    steps
+}

@@ -1,0 +1,193 @@
+//! Pages answer in words: how good a rig is, what hangs on assumptions, what was left out, and what to do next.
+use crate::cli::Folder;
+use handeye::calibrate::{Options, calibrate, evaluate};
+use handeye::recording::{Detection, RecordedCamera, Recording};
+use handeye::report::{Subject, evaluation_steps, html};
+use handeye::rig::{Rig, catalog};
+use handeye::simulate::{SimulateOptions, random_rig, simulate};
+use serde_json::Value;
+use std::ops::ControlFlow;
+
+/// A section of a page, by its id.
+fn section<'a>(page: &'a str, id: &str) -> &'a str {
+    page.split(&format!("<section id=\"{id}\">")).nth(1).unwrap().split("</section>").next().unwrap()
+}
+
+/// A UR5 of which nothing but the joints is known, 0.3 px of noise, readings of two samples exchanged and one image of another moment.
+fn spoilt() -> (Rig, Recording) {
+    let truth = catalog::rig("ur5").unwrap();
+    let mut recording =
+        simulate(&truth, &SimulateOptions { samples: 40, seed: 4, ..SimulateOptions::default() }).unwrap().recording;
+    let joints = |sample: usize| recording.samples[sample].joints.clone();
+    let (fourth, ninth) = (joints(4), joints(9));
+    (recording.samples[4].joints, recording.samples[9].joints) = (ninth, fourth);
+    let is_left = |seen: &Detection| seen.camera == 0;
+    let other: Vec<Detection> = recording.samples[30].pixels.iter().copied().filter(is_left).collect();
+    recording.samples[12].pixels.retain(|seen| !is_left(seen));
+    recording.samples[12].pixels.extend(other);
+    for (recorded, camera) in recording.cameras.iter_mut().zip(&truth.cameras) {
+        *recorded = RecordedCamera::from(camera);
+    }
+    let known = Rig { cameras: Vec::new(), features: Vec::new(), ..truth };
+    (known, recording)
+}
+
+#[test]
+fn a_page_answers_first_whether_the_fit_is_good_how_well_the_tip_is_known_and_what_to_do() {
+    let (known, recording) = spoilt();
+    let learned = calibrate(&known, &recording, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap();
+    let subject = Subject {
+        title: "spoilt",
+        before: &known,
+        calibration: &learned,
+        recording: &recording,
+        suggestion: None,
+        tables: &[],
+    };
+    let page = html(&subject).unwrap();
+    assert!(page.find("<section id=\"verdict\">") < page.find("<section id=\"summary\">"));
+    let verdict = section(&page, "verdict");
+    let report = &learned.report;
+    let pixels = known.noise.pixels;
+    for words in [
+        format!(
+            "{:.3} px rms, where noise of {pixels} px a coordinate gives {:.3} px",
+            report.rms_px,
+            pixels * 2f64.sqrt()
+        ),
+        format!("{} of {} detections", report.rejected, report.rejected + report.observations),
+        "among them 2 whole samples and 1 whole image".to_owned(),
+        "What to do next: ".to_owned(),
+    ] {
+        assert!(verdict.contains(&words), "{words}: {verdict}");
+    }
+    // Scale is known from the joints' lengths alone, 10 mm each.
+    let tip = report.tip.unwrap();
+    assert!(tip.metric && tip.hangs_on_priors() && tip.median > 0.003 && tip.by_data < 0.001, "{tip:?}");
+    for place in [verdict, section(&page, "summary")] {
+        let figures = [tip.by_data, tip.median].map(|length| format!("{:.3} mm", 1e3 * length));
+        assert!(figures.iter().all(|figure| place.contains(figure)), "{figures:?}: {place}");
+    }
+    assert!(verdict.contains("±10 mm on each of the ") && verdict.contains("±0.02 rad on each of the "), "{verdict}");
+    let summary = section(&page, "summary");
+    assert_eq!(summary.matches("left out").count(), 5, "the figure, the heading and three findings: {summary}");
+    for camera in ["left", "right"] {
+        assert!(summary.contains(&format!("the pose of camera `{camera}` is known to ")), "{camera}: {summary}");
+    }
+    // Cells of what moves together stay short.
+    let cells = section(&page, "open").split("<td>").skip(1).map(|cell| cell.split("</td>").next().unwrap());
+    let cells: Vec<&str> = cells.step_by(4).collect();
+    assert!(!cells.is_empty() && cells.iter().all(|cell| cell.matches(", ").count() <= 5), "{cells:#?}");
+    assert!(cells.iter().any(|cell| cell.contains(" more")), "{cells:#?}");
+}
+
+#[test]
+fn a_page_shows_where_numbers_started_and_which_are_assumed() {
+    let (known, recording) = spoilt();
+    let learned = calibrate(&known, &recording, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap();
+    let subject = Subject {
+        title: "spoilt",
+        before: &known,
+        calibration: &learned,
+        recording: &recording,
+        suggestion: None,
+        tables: &[],
+    };
+    let page = html(&subject).unwrap();
+    let row =
+        |path: &str| page.split(&format!("<td>{path}</td>")).nth(1).unwrap().split("</tr>").next().unwrap().to_owned();
+    let start = format!("<td>{:.2}</td>", recording.cameras[0].fx.unwrap());
+    assert!(row("cameras.left.fx").starts_with(&start), "{start}: {}", row("cameras.left.fx"));
+    // Where the last frame lies on its axis is seen by nothing; how long the upper arm is, is.
+    let joints = &known.robot.joints;
+    let last = row(&format!("robot.joints.{}.d", joints[5].name));
+    assert!(last.contains("1.0e-2 (assumed)"), "{last}");
+    assert!(!row(&format!("robot.joints.{}.a", joints[1].name)).contains("assumed"));
+}
+
+#[test]
+fn a_page_says_in_words_whether_the_errors_are_noise() {
+    let (known, mut recording) = spoilt();
+    let answer = |recording: &Recording| {
+        let learned = calibrate(&known, recording, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap();
+        let subject =
+            Subject { title: "noise", before: &known, calibration: &learned, recording, suggestion: None, tables: &[] };
+        let page = html(&subject).unwrap();
+        let is_said_first = section(&page, "verdict").contains("The errors are not noise alone");
+        assert_eq!(is_said_first, section(&page, "histogram").contains("<p>No: "));
+        (section(&page, "histogram").to_owned(), learned.report.rejected)
+    };
+    let (noise, rejected) = answer(&recording);
+    assert!(noise.contains("<p>Yes: "), "{noise}");
+    assert!(
+        noise.contains(&format!("The {rejected} detections that do not fit are not counted.")),
+        "{rejected}: {noise}"
+    );
+    // Every image is shifted by 1 px, this way or that: three standard deviations of its noise.
+    for (number, sample) in recording.samples.iter_mut().enumerate() {
+        for seen in &mut sample.pixels {
+            let angle = 2.4 * (2 * number + seen.camera as usize) as f64;
+            (seen.pixel[0], seen.pixel[1]) = (seen.pixel[0] + angle.cos(), seen.pixel[1] + angle.sin());
+        }
+    }
+    let (shifted, _) = answer(&recording);
+    assert!(shifted.contains("<p>No: ") && shifted.contains("Whole images are shifted"), "{shifted}");
+}
+
+#[test]
+fn an_evaluation_tells_the_error_with_and_without_what_does_not_fit_and_names_it() {
+    let folder = Folder::new("report-fitting");
+    folder.expect(0, "simulate ur5 --samples 40 --seed 1 -o motions.jsonl");
+    folder.expect(0, "calibrate motions.jsonl -o learned.toml");
+    folder.expect(0, "simulate ur5 --samples 30 --seed 2 -o fresh.jsonl");
+    let json = |arguments: &str| -> Value { serde_json::from_str(&folder.expect(0, arguments).0).unwrap() };
+    let clean = json("evaluate learned.toml fresh.jsonl --json");
+    assert_eq!(clean["findings"], serde_json::json!([]));
+    assert_eq!(clean["without_what_does_not_fit"]["rms_px"], clean["rms_px"]);
+    // Line 0 is the header.
+    let text = folder.read("fresh.jsonl");
+    let mut lines: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let (fourth, ninth) = (lines[5]["joints"].clone(), lines[10]["joints"].clone());
+    (lines[5]["joints"], lines[10]["joints"]) = (ninth, fourth);
+    lines[13]["pixels"]["left"] = lines[21]["pixels"]["left"].clone();
+    folder.write("spoilt.jsonl", &lines.iter().map(|line| format!("{line}\n")).collect::<String>());
+    let spoilt = json("evaluate learned.toml spoilt.jsonl --report page.html --json");
+    let named = |finding: &Value| (finding["kind"].clone(), finding["sample"].clone(), finding["swapped_with"].clone());
+    let found: Vec<_> = spoilt["findings"].as_array().unwrap().iter().map(named).collect();
+    let expected = [("wrong_joints", 4, Some(9)), ("wrong_joints", 9, Some(4)), ("wrong_image", 12, None)];
+    let expected = expected.map(|(kind, sample, other)| (kind.into(), sample.into(), serde_json::json!(other)));
+    assert_eq!(found, expected, "{spoilt}");
+    let [all, fitting, usual] = [&spoilt["rms_px"], &spoilt["without_what_does_not_fit"]["rms_px"], &clean["rms_px"]]
+        .map(|px| px.as_f64().unwrap());
+    // Three of thirty samples are gone: the rest has the error that it had, but for the chance of which these are.
+    assert!(all > 10.0 * usual && (fitting / usual - 1.0).abs() < 0.1, "{all} {fitting} {usual}");
+    let (said, _) = folder.expect(0, "evaluate learned.toml spoilt.jsonl");
+    let page = folder.read("page.html");
+    for words in [
+        "sample 12: the image of camera `left` belongs to another pose",
+        "mistakes of the recording rather than of the rig",
+        "Without what does not fit, it predicts these samples about as well",
+    ] {
+        assert!(said.contains(words) && page.contains(words), "{words}: {said}");
+    }
+    assert!(said.contains("without what does not fit, as calibrate leaves it out:"), "{said}");
+}
+
+#[test]
+fn a_camera_that_was_always_worse_than_the_others_is_not_said_to_be_off() {
+    let truth = random_rig(6, 4, 12, 2);
+    let options = SimulateOptions { samples: 40, seed: 2, ..SimulateOptions::default() };
+    let mut recording = simulate(&truth, &options).unwrap().recording;
+    // Five times the noise of 0.3 px, by turns in four directions: one camera of four then has about twice the error of all together.
+    for (number, seen) in recording.samples.iter_mut().flat_map(|sample| &mut sample.pixels).enumerate() {
+        if seen.camera == 0 {
+            seen.pixel[number % 2] += if number % 4 < 2 { 1.5 } else { -1.5 };
+        }
+    }
+    let learned = calibrate(&truth, &recording, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap();
+    let judged = evaluate(&learned.rig, &recording).unwrap();
+    let of_camera = judged.fitting.cameras[0].errors.rms_px / judged.fitting.total.rms_px;
+    assert!(of_camera > 1.5, "{of_camera}");
+    let steps = evaluation_steps(&learned.rig, &judged);
+    assert!(steps[0].contains("about as well as those that it was learned from"), "{steps:?}");
+}
