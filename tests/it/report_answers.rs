@@ -1,6 +1,6 @@
 //! Pages answer in words: how good a rig is, what hangs on assumptions, what was left out, and what to do next.
 use crate::cli::Folder;
-use handeye::calibrate::{Options, calibrate, evaluate};
+use handeye::calibrate::{Calibration, Options, calibrate, evaluate};
 use handeye::recording::{Detection, RecordedCamera, Recording};
 use handeye::report::{Subject, evaluation_steps, html};
 use handeye::rig::{Rig, catalog};
@@ -32,19 +32,19 @@ fn spoilt() -> (Rig, Recording) {
     (known, recording)
 }
 
+/// What is learned from a recording, and its page.
+fn learned(before: &Rig, recording: &Recording) -> (Calibration, String) {
+    let calibration = calibrate(before, recording, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap();
+    let subject =
+        Subject { title: "spoilt", before, calibration: &calibration, recording, suggestion: None, tables: &[] };
+    let page = html(&subject).unwrap();
+    (calibration, page)
+}
+
 #[test]
 fn a_page_answers_first_whether_the_fit_is_good_how_well_the_tip_is_known_and_what_to_do() {
     let (known, recording) = spoilt();
-    let learned = calibrate(&known, &recording, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap();
-    let subject = Subject {
-        title: "spoilt",
-        before: &known,
-        calibration: &learned,
-        recording: &recording,
-        suggestion: None,
-        tables: &[],
-    };
-    let page = html(&subject).unwrap();
+    let (learned, page) = learned(&known, &recording);
     assert!(page.find("<section id=\"verdict\">") < page.find("<section id=\"summary\">"));
     let verdict = section(&page, "verdict");
     let report = &learned.report;
@@ -84,16 +84,7 @@ fn a_page_answers_first_whether_the_fit_is_good_how_well_the_tip_is_known_and_wh
 #[test]
 fn a_page_shows_where_numbers_started_and_which_are_assumed() {
     let (known, recording) = spoilt();
-    let learned = calibrate(&known, &recording, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap();
-    let subject = Subject {
-        title: "spoilt",
-        before: &known,
-        calibration: &learned,
-        recording: &recording,
-        suggestion: None,
-        tables: &[],
-    };
-    let page = html(&subject).unwrap();
+    let (_, page) = learned(&known, &recording);
     let row =
         |path: &str| page.split(&format!("<td>{path}</td>")).nth(1).unwrap().split("</tr>").next().unwrap().to_owned();
     let start = format!("<td>{:.2}</td>", recording.cameras[0].fx.unwrap());
@@ -109,10 +100,7 @@ fn a_page_shows_where_numbers_started_and_which_are_assumed() {
 fn a_page_says_in_words_whether_the_errors_are_noise() {
     let (known, mut recording) = spoilt();
     let answer = |recording: &Recording| {
-        let learned = calibrate(&known, recording, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap();
-        let subject =
-            Subject { title: "noise", before: &known, calibration: &learned, recording, suggestion: None, tables: &[] };
-        let page = html(&subject).unwrap();
+        let (learned, page) = learned(&known, recording);
         let is_said_first = section(&page, "verdict").contains("The errors are not noise alone");
         assert_eq!(is_said_first, section(&page, "histogram").contains("<p>No: "));
         (section(&page, "histogram").to_owned(), learned.report.rejected)
@@ -184,7 +172,7 @@ fn a_camera_that_was_always_worse_than_the_others_is_not_said_to_be_off() {
             seen.pixel[number % 2] += if number % 4 < 2 { 1.5 } else { -1.5 };
         }
     }
-    let learned = calibrate(&truth, &recording, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap();
+    let (learned, _) = learned(&truth, &recording);
     let judged = evaluate(&learned.rig, &recording).unwrap();
     let of_camera = judged.fitting.cameras[0].errors.rms_px / judged.fitting.total.rms_px;
     assert!(of_camera > 1.5, "{of_camera}");

@@ -4,7 +4,7 @@ use handeye::experiments::{Options, Outcome, find};
 use handeye::rig::Limits;
 use handeye::servo::uncalibrated::{Estimate, Exploration, Phase, Quantity, Row, Settings, Stop, Uncalibrated, Update};
 use handeye::servo::{Bound, Constraint, JointBounds, LimitRows, MotionSolver, TaskRows};
-use nalgebra::{DMatrix, dmatrix};
+use nalgebra::{DMatrix, Vector3, dmatrix};
 use std::f64::consts::TAU;
 
 const TRACKERS: [Tracker; 3] = [Tracker::Perfect, Tracker::Rounded, Tracker::Gaussian(0.2)];
@@ -239,6 +239,32 @@ fn nothing_moves_on_what_is_no_number_and_rows_that_are_lost_are_done_without() 
     }
     assert_eq!(servo.phase(), &Phase::Converged);
     assert!(world.errors().iter().all(|error| error.abs() < 0.5), "{:?}", world.errors());
+}
+
+#[test]
+fn where_exploring_anew_shows_nothing_servoing_goes_on_with_what_was_known() {
+    let mut world = Linear::new(0.0);
+    let mut controller = world.controller(Settings::default(), Limits::default());
+    // At right angles to both columns of the Jacobian: no motion removes it, and after a while the Jacobian is doubted for it.
+    let [a, b] = [0, 1].map(|k| Vector3::from_fn(|row, _| world.jacobian[row][k]));
+    let beside = 20.0 * a.cross(&b).normalize();
+    let (mut has_servoed, mut explorations, mut frozen) = (false, 0, None);
+    for _ in 0..200 {
+        let errors: Vec<f64> = world.errors().iter().zip(beside.iter()).map(|(error, more)| error + more).collect();
+        // The trackers freeze while it is explored anew.
+        let seen = frozen.clone().unwrap_or(errors.clone());
+        let command = controller.step(&world.at, &seen, &none(2), 1.0).unwrap();
+        let (phase, motion) = (command.phase.clone(), command.motion.to_vec());
+        assert!(!matches!(phase, Phase::Stopped(_)), "{phase:?}");
+        let is_anew = has_servoed && phase == Phase::Exploring;
+        explorations += usize::from(is_anew && frozen.is_none());
+        frozen = is_anew.then(|| frozen.unwrap_or(errors));
+        has_servoed |= phase != Phase::Exploring;
+        world.carry_out(&motion);
+    }
+    assert!(explorations >= 1);
+    let away = (world.at[0] - world.target[0]).hypot(world.at[1] - world.target[1]);
+    assert!(away < 1e-3, "{away} from where the errors are least");
 }
 
 #[test]
