@@ -55,7 +55,8 @@ pub fn servo<W: Controlled>(
         let (errors, readings) = (world.errors(), world.readings());
         let command = controller.step(&readings, &errors, &limits, 1.0)?;
         let (motion, phase) = (command.motion.to_vec(), command.phase.clone());
-        let has_explored = phase != Phase::Exploring || !found.errors.is_empty();
+        let is_first = matches!(phase, Phase::Exploring | Phase::Waiting(_));
+        let has_explored = !is_first || !found.errors.is_empty();
         if has_explored {
             if let (true, Some(estimate)) = (found.errors.is_empty(), controller.estimate()) {
                 found.condition = Some(estimate.condition());

@@ -72,6 +72,11 @@ pub trait Controller {
         mean_distance(now.seen, goal, left_out)
     }
 
+    /// Whether readings of joints that are no numbers hold the robot; where not, they are as good as none.
+    fn reads_joints(&self) -> bool {
+        false
+    }
+
     /// Told when the robot is held in place of a command: it stands still from now on.
     fn held(&mut self) {}
 }
@@ -100,6 +105,10 @@ impl<C: Controller + ?Sized> Controller for Box<C> {
 
     fn error_px(&self, now: &Measurement<'_>, goal: &[Sighting], left_out: &[(usize, usize)]) -> Option<f64> {
         (**self).error_px(now, goal, left_out)
+    }
+
+    fn reads_joints(&self) -> bool {
+        (**self).reads_joints()
     }
 
     fn held(&mut self) {

@@ -41,7 +41,7 @@ impl Readings {
         self.quantities.iter_mut().zip(widths).for_each(|(quantity, width)| quantity.dead_band = width);
     }
 
-    /// Takes what was read, empty where nothing was or something that is no number. True where servoing has to begin anew, as what was taken
+    /// Takes what was read, empty where the robot gives nothing. True where servoing has to begin anew, as what was taken
     /// before was a sum of motions, which starts at 0 and not where things are.
     ///
     /// Errors: [`Error::NotEnoughData`] where nothing was read and something has to be, as it `must` or was before: no sum stands for it.

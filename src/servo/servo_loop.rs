@@ -90,6 +90,9 @@ pub struct ServoLoop<C> {
     n_diverged: usize,
     /// Commands in a row that something held back.
     n_held_back: usize,
+    /// Whether the controller has been asked since the loop began, and what it decided last was to explore.
+    has_decided: bool,
+    explores: bool,
     stop: Option<Stop>,
 }
 
@@ -113,6 +116,8 @@ impl<C: Controller> ServoLoop<C> {
             n_settled: 0,
             n_diverged: 0,
             n_held_back: 0,
+            has_decided: false,
+            explores: false,
             stop: None,
         }
     }
@@ -130,7 +135,7 @@ impl<C: Controller> ServoLoop<C> {
         (self.n_settled, self.n_held_back) = (0, 0);
         let has_stopped = self.stop.take().is_some();
         if has_stopped {
-            self.began = None;
+            (self.began, self.has_decided, self.explores) = (None, false, false);
         }
         if self.settings.follow && !has_stopped {
             self.baseline_px = self.baseline_px.map(|baseline| baseline + moved);
@@ -181,6 +186,9 @@ impl<C: Controller> ServoLoop<C> {
         let Some(error) = error_px else {
             return Ok(self.wait(now, None, "nothing is seen of what is aimed at".to_owned()));
         };
+        if readable.len() < measurement.joints.len() && self.controller.reads_joints() {
+            return Ok(self.wait(now, error_px, "the joints are not read, or not as numbers".to_owned()));
+        }
         // A measurement that is seen twice tells nothing the second time.
         let is_new = measurement.time > self.judged;
         if is_new {
@@ -190,6 +198,11 @@ impl<C: Controller> ServoLoop<C> {
         if self.stop.is_some() {
             return Ok(self.hold(error_px, None));
         }
+        if self.n_settled > 0 && !self.has_decided {
+            // It is there before anything has moved: what would have to be explored first would lead away.
+            self.useful = now;
+            return Ok(self.hold(error_px, None));
+        }
         let decision = match self.controller.decide(&usable, limits, dt) {
             Ok(decision) if decision.command.is_finite() => decision,
             Ok(_) => return Ok(self.wait(now, error_px, "the motion would not have been finite".to_owned())),
@@ -197,6 +210,7 @@ impl<C: Controller> ServoLoop<C> {
             Err(error) => return Err(error),
         };
         self.useful = now;
+        (self.has_decided, self.explores) = (true, decision.explores);
         self.n_held_back = if decision.active.is_empty() { 0 } else { self.n_held_back + 1 };
         if decision.explores || decision.left_out != self.left_out {
             self.errors.clear();
@@ -221,7 +235,9 @@ impl<C: Controller> ServoLoop<C> {
         let baseline = *self.baseline_px.get_or_insert(if unknown { f64::INFINITY } else { error });
         let in_a_row = |so_far: usize, again: bool| if again { so_far + 1 } else { 0 };
         self.n_settled = in_a_row(self.n_settled, error <= settings.tolerance_px);
-        self.n_diverged = in_a_row(self.n_diverged, error > settings.diverged * baseline.max(settings.tolerance_px));
+        // A motion to learn from leads away for as long as it takes.
+        let has_diverged = !self.explores && error > settings.diverged * baseline.max(settings.tolerance_px);
+        self.n_diverged = in_a_row(self.n_diverged, has_diverged);
         if self.n_diverged >= 2 {
             self.stop = Some(Stop::Diverged { from_px: baseline, error_px: error });
         } else if self.n_settled >= settings.settled.max(1) && !settings.follow {

@@ -2,7 +2,7 @@
 use super::readings::Readings;
 use super::rig_foresight::RigForesight;
 use super::tracker_watch::TrackerWatch;
-use super::uncalibrated::{Phase, Quantity, Row, Settings, Uncalibrated, for_rows, stop_of};
+use super::uncalibrated::{Phase, Quantity, Row, Settings, Uncalibrated, stop_of};
 use super::{Arm, Configuration, Controller, Decision, Limit, LimitRows, Measurement, Takes};
 use crate::Error;
 use crate::infer::Sighting;
@@ -108,7 +108,7 @@ impl UncalibratedJoints {
         }
         let row = |goal: &Sighting| [Row { sd: self.sd_px, camera: goal.camera }; 2];
         let rows: Vec<Row> = self.rows.iter().flat_map(row).collect();
-        let mut servo = Uncalibrated::new(self.readings.quantities(), rows, for_rows(&self.settings, m))?;
+        let mut servo = Uncalibrated::new(self.readings.quantities(), rows, self.settings.for_rows(m))?;
         if let Some((rig, _)) = &self.rig {
             servo.begin_with_model(Box::new(RigForesight::new(rig, &self.rows)?));
         }
@@ -172,6 +172,10 @@ impl Controller for UncalibratedJoints {
         } else {
             (self.servo, self.rows) = (None, Vec::new());
         }
+    }
+
+    fn reads_joints(&self) -> bool {
+        true
     }
 
     fn decide(&mut self, now: &Measurement<'_>, limits: &[&dyn Limit], dt: f64) -> Result<Decision, Error> {

@@ -2,7 +2,7 @@
 use super::image_tasks::{ImageTask, Place, Seen};
 use super::readings::Readings;
 use super::target_watch::TargetWatch;
-use super::uncalibrated::{Phase, Quantity, Row, Settings, Uncalibrated, for_rows, stop_of};
+use super::uncalibrated::{Phase, Quantity, Row, Settings, Uncalibrated, stop_of};
 use super::{Controller, Decision, Limit, LimitRows, Measurement, Takes};
 use crate::Error;
 use crate::infer::Sighting;
@@ -85,6 +85,13 @@ impl UncalibratedTask {
         self.servo.as_ref().map(Uncalibrated::phase)
     }
 
+    /// Errors without those of rows that exploring has dropped.
+    fn believed(&self, mut errors: Vec<f64>) -> Vec<f64> {
+        let dropped = self.servo.as_ref().map_or(&[][..], Uncalibrated::dropped);
+        dropped.iter().for_each(|row| errors[*row] = f64::NAN);
+        errors
+    }
+
     /// Where every feature is seen.
     fn see(&self, now: &Measurement<'_>) -> Seen {
         let mut seen = Seen::new(&self.task);
@@ -122,9 +129,13 @@ impl Controller for UncalibratedTask {
     /// A task has its target among its own features: what is aimed at beside is not looked at.
     fn aim(&mut self, _: &[Sighting]) {}
 
-    /// Root of the mean square of the rows that are seen.
+    /// Root of the mean square of the rows that are seen and believed.
     fn error_px(&self, now: &Measurement<'_>, _: &[Sighting], _: &[(usize, usize)]) -> Option<f64> {
-        root_mean_square(&self.task.values(&self.see(now)))
+        root_mean_square(&self.believed(self.task.values(&self.see(now))))
+    }
+
+    fn reads_joints(&self) -> bool {
+        !matches!(self.takes, Takes::PoseDelta | Takes::PoseVelocity)
     }
 
     fn decide(&mut self, now: &Measurement<'_>, limits: &[&dyn Limit], dt: f64) -> Result<Decision, Error> {
@@ -141,7 +152,7 @@ impl Controller for UncalibratedTask {
             Some(servo) => servo,
             none => {
                 let rows = self.task.signals(&seen)?;
-                let settings = for_rows(&self.settings, rows.len());
+                let settings = self.settings.for_rows(rows.len());
                 none.insert(Uncalibrated::new(self.readings.quantities(), rows, settings)?)
             }
         };
@@ -154,7 +165,7 @@ impl Controller for UncalibratedTask {
         let told = servo.step(self.readings.now(), &self.errors, &self.limits, dt)?;
         let (phase, motion) = (told.phase.clone(), told.motion.to_vec());
         let (active, conflict) = (told.active.to_vec(), told.conflict.to_vec());
-        let error_px = root_mean_square(&self.errors).unwrap_or(f64::NAN);
+        let error_px = root_mean_square(&self.believed(self.errors.clone())).unwrap_or(f64::NAN);
         let stop = stop_of(&phase, std::mem::replace(&mut self.error_px, error_px), error_px)?;
         self.readings.moves(&motion);
         let command = if stop.is_some() { Command::Hold } else { self.command(&motion, dt) };

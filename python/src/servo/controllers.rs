@@ -69,6 +69,14 @@ impl servo::Controller for Shared {
         self.lock().any().decide(now, limits, dt)
     }
 
+    fn error_px(&self, now: &Measurement<'_>, goal: &[Sighting], left_out: &[(usize, usize)]) -> Option<f64> {
+        self.lock().any().error_px(now, goal, left_out)
+    }
+
+    fn reads_joints(&self) -> bool {
+        self.lock().any().reads_joints()
+    }
+
     fn held(&mut self) {
         self.lock().any().held();
     }

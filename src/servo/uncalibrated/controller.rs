@@ -44,8 +44,9 @@ pub struct Uncalibrated {
     pub(super) noise: f64,
     /// Rows that are seen now.
     pub(super) seen: Vec<usize>,
-    /// Rows of which the exploration found out nothing.
+    /// Rows of which the exploration found out nothing, and those of which the one before had not.
     pub(super) dropped: Vec<usize>,
+    pub(super) dropped_before: Vec<usize>,
     pub(super) aim: Aim,
     pub(super) bounds: JointBounds,
     pub(super) tasks: [TaskRows; 1],
@@ -82,6 +83,7 @@ impl Uncalibrated {
             velocity: vec![0.0; n],
             seen: Vec::new(),
             dropped: Vec::new(),
+            dropped_before: Vec::new(),
             aim: Aim::default(),
             bounds: JointBounds::default(),
             tasks: [TaskRows::default()],

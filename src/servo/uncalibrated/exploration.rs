@@ -145,7 +145,7 @@ impl Explorer {
         if change.iter().any(|change| !change.is_finite()) {
             return Next::Failed("a tracker was lost while exploring".to_owned());
         }
-        let clarity = clarity(&change, rows);
+        let clarity = clarity(&change, rows, &self.dropped);
         let largest = settings.largest.min(self.rooms[k].max(settings.size));
         if clarity < settings.clarity && self.size < largest {
             // As far as it takes, judged by what was seen so far; at most four times as far, as that may be noise.
@@ -243,9 +243,10 @@ fn room(along: &[f64], quantities: &[Quantity], at: &[f64]) -> f64 {
     along.iter().zip(quantities).zip(at).map(of).fold(f64::INFINITY, f64::min)
 }
 
-/// Root mean square of changes over their rows' standard deviations.
-fn clarity(change: &[f64], rows: &[Row]) -> f64 {
-    let squares: f64 =
-        change.iter().zip(rows).map(|(change, row)| (change / row.sd.max(f64::MIN_POSITIVE)).powi(2)).sum();
-    (squares / rows.len().max(1) as f64).sqrt()
+/// Root mean square of changes over their rows' standard deviations, of rows that are not dropped.
+fn clarity(change: &[f64], rows: &[Row], dropped: &[bool]) -> f64 {
+    let known = change.iter().zip(rows).zip(dropped).filter(|(_, dropped)| !**dropped);
+    let square = |change: f64, sd: f64| (change / sd.max(f64::MIN_POSITIVE)).powi(2);
+    let (sum, n) = known.fold((0.0, 0.0), |(sum, n), ((change, row), _)| (sum + square(*change, row.sd), n + 1.0));
+    (sum / f64::max(n, 1.0)).sqrt()
 }

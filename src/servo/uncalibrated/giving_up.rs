@@ -1,16 +1,7 @@
 //! What a loop is told where servoing without a rig goes on no more.
-use super::settings::Settings;
 use super::signals::{Phase, Stop as Gave};
 use crate::Error;
 use crate::servo::Stop;
-
-/// Rows of the thesis's tasks, to which [`Settings::divergence`] refers.
-const ROWS: f64 = 12.0;
-
-/// Settings for as many rows: the errors of more may grow by more.
-pub(in crate::servo) fn for_rows(settings: &Settings, rows: usize) -> Settings {
-    Settings { divergence: settings.divergence * f64::max(1.0, rows as f64 / ROWS), ..settings.clone() }
-}
 
 /// Why a controller gives up in a phase, if it does. `from_px`, `error_px`: the error that its loop judges, before and now [px].
 ///

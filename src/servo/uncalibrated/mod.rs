@@ -22,6 +22,6 @@ mod views;
 pub use controller::Uncalibrated;
 pub use estimate::Estimate;
 pub use foresight::Foresight;
-pub(super) use giving_up::{for_rows, stop_of};
+pub(super) use giving_up::stop_of;
 pub use settings::{Exploration, Settings, Trust, Update};
 pub use signals::{Command, Phase, Quantity, Row, Stop};

@@ -23,7 +23,9 @@ impl Uncalibrated {
             if seen < needed {
                 return Phase::Waiting(format!("{seen} of {all} rows are seen; exploring begins with {needed}"));
             }
-            if let Some([first, second]) = coinciding(&self.rows, errors) {
+            if self.losses == 0
+                && let Some([first, second]) = coinciding(&self.rows, errors)
+            {
                 return Phase::Stopped(Stop::Undetermined(format!(
                     "cameras {first} and {second} see the same and leave one point of view: put them apart"
                 )));
@@ -43,15 +45,12 @@ impl Uncalibrated {
             Next::Done(mut estimate) => {
                 let (condition, worst) = (estimate.condition(), self.settings.worst_condition);
                 let is_poor = condition.is_nan() || condition > worst;
-                if is_poor && let Some(good) = self.good.take_if(|_| self.losses > 0) {
-                    // What was known before shows more.
-                    return self.go_back_to(good, readings, errors, limits);
-                }
                 if is_poor {
-                    return Phase::Stopped(Stop::Undetermined(format!(
+                    let reason = format!(
                         "the exploratory motions look alike, with a condition number of {condition:.0} above {worst:.0}: \
                          see from more sides, or more features"
-                    )));
+                    );
+                    return self.has_not_found_out(reason, readings, errors, limits);
                 }
                 self.dropped = explorer.dropped().collect();
                 self.explorer = None;
@@ -60,7 +59,7 @@ impl Uncalibrated {
                 self.estimate = Some(*estimate);
                 self.servo(readings, errors, limits)
             }
-            Next::Failed(reason) => Phase::Stopped(Stop::Undetermined(reason)),
+            Next::Failed(reason) => self.has_not_found_out(reason, readings, errors, limits),
         }
     }
 
@@ -133,11 +132,24 @@ impl Uncalibrated {
         self.stall.explores();
         self.losses += 1;
         (self.estimate, self.ahead) = (None, None);
-        self.dropped.clear();
+        self.dropped_before = std::mem::take(&mut self.dropped);
         let settings = &self.settings.exploration;
         self.explorer = directions
             .map(|directions| Explorer::to_both_sides(&directions, settings, &self.quantities, readings, errors));
         self.explore(readings, errors, limits)
+    }
+
+    /// Exploring has led to nothing. Where it was done anew, what was known before stands, without the rows that it was done without and those
+    /// whose trackers were lost meanwhile.
+    fn has_not_found_out(&mut self, reason: String, readings: &[f64], errors: &[f64], limits: &LimitRows) -> Phase {
+        let Some(good) = self.good.take_if(|_| self.losses > 0) else {
+            return Phase::Stopped(Stop::Undetermined(reason));
+        };
+        self.dropped = std::mem::take(&mut self.dropped_before);
+        let lost: Vec<usize> = self.explorer.iter().flat_map(Explorer::dropped).collect();
+        lost.into_iter().for_each(|row| self.give_up(row));
+        self.seen.retain(|row| !self.dropped.contains(row));
+        self.go_back_to(good, readings, errors, limits)
     }
 
     fn go_back_to(&mut self, mut good: Estimate, readings: &[f64], errors: &[f64], limits: &LimitRows) -> Phase {
@@ -168,7 +180,7 @@ impl Uncalibrated {
             Some(good) => self.go_back_to(good, readings, errors, limits),
             None => {
                 (self.estimate, self.ahead) = (None, None);
-                self.dropped.clear();
+                self.dropped_before = std::mem::take(&mut self.dropped);
                 self.seen.clear();
                 self.seen.extend((0..errors.len()).filter(|row| errors[*row].is_finite()));
                 self.explore(readings, errors, limits)

@@ -88,7 +88,15 @@ impl Default for Settings {
     }
 }
 
+/// Rows of the thesis's tasks, to which [`Settings::divergence`] refers.
+const ROWS: f64 = 12.0;
+
 impl Settings {
+    /// For as many rows: the errors of more may grow by more.
+    pub(in crate::servo) fn for_rows(&self, rows: usize) -> Settings {
+        Settings { divergence: self.divergence * f64::max(1.0, rows as f64 / ROWS), ..self.clone() }
+    }
+
     /// The controller of the thesis, dq = -λ J⁺ e (eq. 2.15), with motions of `size` along every quantity and J kept as explored.
     pub fn plain(gain: f64, size: f64) -> Self {
         Settings {
