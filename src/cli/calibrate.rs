@@ -15,7 +15,7 @@ use handeye::calibrate::{
     calibrate, camera_deviations, relearn, select_noise,
 };
 use handeye::report;
-use handeye::rig::Rig;
+use handeye::rig::{Rig, files_named};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -77,11 +77,13 @@ impl Calibrate {
     pub fn run(&self, is_json: bool) -> Result<Answer, Error> {
         let input = self.rig.as_deref().map(read_rig).transpose()?;
         let recording = read_recordings_with_new(&self.recordings, input.as_ref(), &self.reading, &self.relearn)?;
-        check_output(&self.output, &self.recordings)?;
+        let of_rig = self.rig.as_deref().map_or_else(Vec::new, files_named);
+        let mut inputs: Vec<PathBuf> = self.recordings.iter().cloned().chain(of_rig).collect();
+        check_output(&self.output, &inputs)?;
         if let Some(page) = &self.report {
             // Where the rig is learned into its own file, that is another output.
-            let rig = self.rig.iter().filter(|rig| !is_same(rig, &self.output)).cloned();
-            check_output(page, &self.recordings.iter().cloned().chain(rig).collect::<Vec<_>>())?;
+            inputs.extend(self.rig.iter().filter(|rig| !is_same(rig, &self.output)).cloned());
+            check_output(page, &inputs)?;
             if is_same(page, &self.output) {
                 return Err(Error::Unusable(format!("{}: given for two outputs", page.display())));
             }

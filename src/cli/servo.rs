@@ -7,7 +7,7 @@ use super::words::count;
 use clap::Args;
 use handeye::Error;
 use handeye::report::servo_html;
-use handeye::rig::Rig;
+use handeye::rig::{Rig, files_named};
 use handeye::scene::{self, Moment, Run, Scene};
 use handeye::servo::{Command, Stop};
 use serde_json::{Value, json};
@@ -56,7 +56,9 @@ impl Servo {
     pub fn run(&self, is_json: bool) -> Result<Answer, Error> {
         let input = self.rig.as_deref().map(read_rig).transpose()?;
         let mut scene = read_scene(&self.scene)?;
-        let inputs: Vec<PathBuf> = self.rig.iter().chain([&self.scene]).chain(&scene.files).cloned().collect();
+        let of_rig = self.rig.as_deref().map_or_else(Vec::new, files_named);
+        let inputs: Vec<PathBuf> =
+            self.rig.iter().chain([&self.scene]).chain(&scene.files).chain(&of_rig).cloned().collect();
         for output in self.plot.iter().chain(&self.report) {
             check_output(output, &inputs)?;
         }

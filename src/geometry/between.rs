@@ -1,7 +1,6 @@
-//! Poses between two others, and poses from which a camera looks at a point.
+//! Poses between two others.
 use handeye_solvers::Pose;
 use handeye_solvers::manifold::so3;
-use nalgebra::{Matrix3, Vector3};
 
 /// The pose at a share of the way, from 0 at the one to 1 at the other, which are given exactly: the origin goes on a line, the rotation
 /// about one axis at one speed (slerp).
@@ -21,21 +20,10 @@ pub fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
     }
 }
 
-/// `world_from_camera` of a camera at a place that looks at another [m], its images upright where `down` points down. `None` where the two
-/// places are one, or `down` points along the way from one to the other.
-pub fn looking_at(from: &Vector3<f64>, at: &Vector3<f64>, down: &Vector3<f64>) -> Option<Pose> {
-    let ahead = (at - from).try_normalize(0.0)?;
-    let right = down.try_normalize(0.0)?.cross(&ahead).try_normalize(ALONG)?;
-    Some(Pose { translation: *from, rotation: Matrix3::from_columns(&[right, ahead.cross(&right), ahead]) })
-}
-
-/// Nearer than this to the way, what points down says nothing of the turn about it [rad].
-const ALONG: f64 = 1e-12;
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+    use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
     fn poses() -> impl Iterator<Item = Pose> {
         (0..30).map(|i| {
@@ -58,21 +46,5 @@ mod tests {
             }
             assert_eq!((between(&from, &to, 0.0), between(&from, &to, 1.0)), (from, to));
         }
-    }
-
-    #[test]
-    fn what_is_looked_at_lies_on_the_axis_and_what_is_below_it_below() {
-        for (from, at) in poses().zip(poses().skip(5)) {
-            let down = -Vector3::z();
-            let pose = looking_at(&from.translation, &at.translation, &down).unwrap();
-            assert!((pose.rotation.determinant() - 1.0).abs() < 1e-12);
-            let [ahead, below] =
-                [at.translation, at.translation + 0.01 * down].map(|point| pose.inverse_transform(&point));
-            assert!((ahead - (at.translation - from.translation).norm() * Vector3::z()).norm() < 1e-12);
-            assert!(below.y > 0.0 && below.x.abs() < 1e-12, "{below}");
-        }
-        let here = Vector3::new(1.0, 2.0, 3.0);
-        assert_eq!(looking_at(&here, &here, &Vector3::z()), None);
-        assert_eq!(looking_at(&here, &(here + Vector3::z()), &Vector3::z()), None);
     }
 }

@@ -13,7 +13,7 @@ pub use model::{Model, ModelCamera, ModelFeature};
 pub(crate) use names::{problem_of_joint_name, problem_of_name};
 pub use paths::{CameraField, JointField, Parameter, matches};
 pub(crate) use read::problem_of_distortion;
-pub use read::read_text;
+pub use read::{files_named, read_text};
 pub use replace::replace_file;
 pub use types::*;
 pub use values::Value;

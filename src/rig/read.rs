@@ -1,6 +1,7 @@
 //! Reading rig files: every mistake is reported with its line and column, what was found, and what would do.
 pub(crate) mod document;
 mod estimate;
+mod files;
 mod fit;
 pub(crate) mod named;
 pub(crate) mod noise;
@@ -12,6 +13,7 @@ mod views;
 use super::Rig;
 use crate::Error;
 use document::{Node, Source};
+pub use files::files_named;
 use std::path::Path;
 pub(crate) use views::problem_of_distortion;
 

@@ -25,10 +25,11 @@ pub(super) fn check(scene: &Scene, control: &Control, truth: &Rig, known: &Rig) 
             camera.name
         )));
     }
-    if let (Some(_), Some((limit, _))) = (&scene.task, scene.limits.first()) {
-        return Err(Error::Unusable(format!("limit `{limit}` needs a rig, and a task is carried out without one")));
-    }
     let is_without_rig = matches!(control, Control::Uncalibrated(UncalibratedControl { hybrid: false, .. }));
+    if let (true, Some((limit, _))) = (is_without_rig, scene.limits.first()) {
+        let who = if scene.task.is_some() { "a task is" } else { "servoing of kind uncalibrated is" };
+        return Err(Error::Unusable(format!("limit `{limit}` needs a rig, and {who} carried out without one")));
+    }
     if scene.task.is_some() && !is_without_rig {
         let name = control.name();
         return Err(Error::Unusable(format!(
@@ -67,11 +68,12 @@ pub(super) fn check(scene: &Scene, control: &Control, truth: &Rig, known: &Rig) 
 }
 
 /// Why `path` or `velocity` of a target is refused.
-pub(super) const MOVES_NOTHING: &str = "moves nothing: what a target takes along are features of a task on the target with their `xyz` in the task, and there are none";
+pub(super) const MOVES_NOTHING: &str = "moves nothing: what a target takes along are features on the target with their `xyz` in the task that are named in its `tasks`, and there are none";
 
-/// Whether the target of a task takes anything along where it moves.
+/// Whether the target of a task takes anything along where it moves that the task looks at.
 pub(super) fn carries(task: &ImageTask) -> bool {
-    task.features().iter().any(|feature| matches!(feature.place, Place::Target(Some(_))))
+    let is_carried = |feature: &usize| matches!(task.features()[*feature].place, Place::Target(Some(_)));
+    task.parts().iter().any(|part| part.kind.features().iter().any(is_carried))
 }
 
 /// More steps than anybody wants to see.

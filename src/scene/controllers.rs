@@ -2,6 +2,7 @@
 use super::{Control, Scene, UncalibratedControl};
 use crate::Error;
 use crate::rig::{Parent, Rig};
+use crate::servo::image_tasks::ImageTask;
 use crate::servo::{
     Controller, ImageBased, ModelBased, ModelBasedTip, PoseBased, Takes, UncalibratedJoints, UncalibratedTask,
 };
@@ -46,37 +47,43 @@ impl Scene {
                 controller.takes = takes;
                 Box::new(controller)
             }
-            Control::Uncalibrated(control) if self.task.is_some() => {
-                let Some(task) = self.task.clone() else { return Err(needs_rig(name)) };
-                let truth = self.rig.as_ref().unwrap_or(known);
-                let mut controller = UncalibratedTask::new(task, takes, &truth.robot.joints, control.settings.clone())?;
-                controller.dead_band(control.dead_band)?;
-                // What anybody sees who looks at the robot.
-                let is_carried = |name: &String| {
-                    truth.cameras.iter().any(|camera| camera.name == *name && camera.parent != Parent::World)
-                };
-                let cameras = self.task.iter().flat_map(|task| task.cameras());
-                controller.carried = cameras.map(is_carried).collect();
-                Box::new(controller)
-            }
-            Control::Uncalibrated(_) if moves_tip => {
-                return Err(Error::Unusable(format!(
-                    "a controller of kind {name} moves joints, this robot takes {}",
-                    takes.name()
-                )));
-            }
-            Control::Uncalibrated(UncalibratedControl { pixels, settings, dead_band, hybrid }) => {
-                let settings = settings.clone();
-                let mut controller = if *hybrid {
-                    UncalibratedJoints::with_rig(rig()?, *pixels, settings)?
-                } else {
-                    UncalibratedJoints::new(&known.robot.joints, *pixels, settings)?
-                };
-                controller.takes = takes;
-                controller.dead_bands(&vec![*dead_band; known.robot.joints.len()])?;
-                Box::new(controller)
-            }
+            Control::Uncalibrated(control) => match &self.task {
+                Some(task) => Box::new(self.carrying_out(task.clone(), control, self.rig.as_ref().unwrap_or(known))?),
+                None if moves_tip => {
+                    return Err(Error::Unusable(format!(
+                        "a controller of kind {name} moves joints, this robot takes {}",
+                        takes.name()
+                    )));
+                }
+                None => {
+                    let (pixels, settings) = (control.pixels, control.settings.clone());
+                    let mut controller = if control.hybrid {
+                        UncalibratedJoints::with_rig(rig()?, pixels, settings)?
+                    } else {
+                        UncalibratedJoints::new(&known.robot.joints, pixels, settings)?
+                    };
+                    controller.takes = takes;
+                    controller.dead_bands(&vec![control.dead_band; known.robot.joints.len()])?;
+                    Box::new(controller)
+                }
+            },
         })
+    }
+
+    /// The controller of a task; `truth`: the rig on which anybody sees what carries which camera.
+    fn carrying_out(
+        &self,
+        task: ImageTask,
+        control: &UncalibratedControl,
+        truth: &Rig,
+    ) -> Result<UncalibratedTask, Error> {
+        let is_carried =
+            |name: &String| truth.cameras.iter().any(|camera| camera.name == *name && camera.parent != Parent::World);
+        let carried = task.cameras().iter().map(is_carried).collect();
+        let mut controller = UncalibratedTask::new(task, self.takes, &truth.robot.joints, control.settings.clone())?;
+        controller.dead_band(control.dead_band)?;
+        controller.carried = carried;
+        Ok(controller)
     }
 }
 

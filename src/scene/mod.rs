@@ -63,7 +63,7 @@ pub struct Scene {
     pub settings: LoopSettings,
     /// Seconds from one command to the next.
     pub dt: f64,
-    /// Files that it was read from beside its own: its rig, its task, the recording of its target's path.
+    /// Files that it was read from beside its own: its rig and what that names, its task, the recording of its target's path.
     pub files: Vec<PathBuf>,
 }
 

@@ -8,7 +8,7 @@ use super::read_target::{read_target, read_task};
 use crate::Error;
 use crate::rig::read::document::{Field, Fields, Node, Source, parse};
 use crate::rig::read::noise::read_pose_noise;
-use crate::rig::{Rig, catalog, read::read_text};
+use crate::rig::{Rig, catalog, files_named, read_text};
 use crate::servo::{LoopSettings, Takes, image_tasks};
 use crate::simulate::world::{Execution, Tracker, WorldOptions};
 use std::path::{Path, PathBuf};
@@ -60,7 +60,9 @@ impl Scene {
         let tracker = section("tracker", &["kind", "sd", "at", "points", "missed", "faults"])?;
         let tracker = tracker.as_ref();
         let (kind, missed) = tracker.map_or(Ok((Tracker::Exact, 0.0)), read_tracker)?;
-        let points = tracker.map(|fields| fields.optional("points", Node::not_negative)).transpose()?.flatten();
+        let has_depth = rig.as_ref().is_none_or(|rig| rig.cameras.iter().any(|camera| camera.depth));
+        let points = tracker.map(|fields| fields.optional("points", |node| read_points(node, has_depth)));
+        let points = points.transpose()?.flatten();
         let control = match root.field("controller") {
             Some(field) => Some(read_control(field.value, task.is_some())?),
             None => None,
@@ -105,6 +107,7 @@ impl Scene {
             ]
             .into_iter()
             .flatten()
+            .flat_map(|file| [vec![file.clone()], files_named(&file)].concat())
             .collect(),
             rig,
         };
@@ -140,11 +143,15 @@ fn read_rig(node: &Node, folder: &Path) -> Result<Rig, Error> {
 pub(super) fn joints(fields: &Fields, key: &str, rig: Option<&Rig>) -> Result<Vec<f64>, Error> {
     let field =
         fields.field(key).ok_or_else(|| fields.error(format!("has no `{key}` (one number per joint, rad or m)")))?;
-    let found = field.value.any_numbers()?;
+    per_joint(&field.value, rig)
+}
+
+/// One number per joint, of the rig where the scene names one.
+pub(super) fn per_joint(node: &Node, rig: Option<&Rig>) -> Result<Vec<f64>, Error> {
+    let found = node.any_numbers()?;
     match rig.map(|rig| rig.robot.joints.len()) {
-        Some(n) if n != found.len() => {
-            Err(field.value.error(format!("has {} numbers, the rig has {n} joints", found.len())))
-        }
+        Some(n) if n != found.len() => Err(node.error(format!("has {} numbers, the rig has {n} joints", found.len()))),
+        None if found.is_empty() => Err(node.error("has no number, and every joint needs one")),
         _ => Ok(found),
     }
 }
@@ -156,6 +163,11 @@ fn read_readings(node: &Node) -> Result<Option<f64>, Error> {
         Ok(true) => Ok(Some(0.0)),
         Err(_) => node.not_negative().map(Some),
     }
+}
+
+/// Noise of the points that depth cameras give.
+fn read_points(node: &Node, has_depth: bool) -> Result<f64, Error> {
+    if has_depth { node.not_negative() } else { Err(node.error("is noise of depth cameras, and the rig has none")) }
 }
 
 fn read_execution(node: &Node) -> Result<Execution, Error> {

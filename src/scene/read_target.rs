@@ -1,5 +1,5 @@
 //! Reading where a scene leads: its target, and its task.
-use super::read::joints;
+use super::read::{joints, per_joint};
 use super::{Target, Waypoint};
 use crate::Error;
 use crate::recording::Recording;
@@ -17,7 +17,7 @@ pub(super) fn read_target(fields: &Fields, rig: Option<&Rig>, folder: &Path) -> 
     }
     Ok(Target {
         joints: joints(fields, "joints", rig)?,
-        velocity: fields.optional("velocity", Node::any_numbers)?.unwrap_or_default(),
+        velocity: fields.optional("velocity", |node| per_joint(node, rig))?.unwrap_or_default(),
         until: fields.optional("until", Node::not_negative)?.unwrap_or(f64::INFINITY),
         path: fields.optional("path", |node| read_path(node, folder))?.unwrap_or_default(),
     })

@@ -111,17 +111,17 @@ impl UncalibratedTask {
     }
 
     fn command(&self, motion: &[f64], dt: f64) -> Command {
+        self.readings.command(self.takes, motion, dt).unwrap_or_else(|| self.command_of_tip(motion, dt))
+    }
+
+    /// For a robot that does not take joints.
+    fn command_of_tip(&self, motion: &[f64], dt: f64) -> Command {
         let shift = |m: &[f64]| REACH * Vector3::new(m[0], m[1], m[2]);
-        match self.takes {
-            Takes::Joints | Takes::JointDelta | Takes::JointVelocity => {
-                self.readings.command(self.takes, motion, dt).unwrap_or(Command::Hold)
-            }
-            Takes::PoseDelta => Command::PoseDelta(Pose { rotation: Matrix3::identity(), translation: shift(motion) }),
-            Takes::PoseVelocity => {
-                let (w, v) = (Vector3::new(motion[0], motion[1], motion[2]) / dt, shift(&motion[3..]) / dt);
-                Command::PoseVelocity([w.x, w.y, w.z, v.x, v.y, v.z])
-            }
+        if self.takes == Takes::PoseVelocity {
+            let (w, v) = (Vector3::new(motion[0], motion[1], motion[2]) / dt, shift(&motion[3..]) / dt);
+            return Command::PoseVelocity([w.x, w.y, w.z, v.x, v.y, v.z]);
         }
+        Command::PoseDelta(Pose { rotation: Matrix3::identity(), translation: shift(motion) })
     }
 }
 
@@ -142,8 +142,7 @@ impl Controller for UncalibratedTask {
         if !limits.is_empty() {
             return Err(Error::Unusable("limits beside those of the joints need a rig, and none is given".to_owned()));
         }
-        let moves_joints = !matches!(self.takes, Takes::PoseDelta | Takes::PoseVelocity);
-        let read = if moves_joints { now.joints } else { &[] };
+        let read = if self.reads_joints() { now.joints } else { &[] };
         if self.readings.take(read, self.takes == Takes::Joints)? {
             (self.servo, self.target) = (None, None);
         }

@@ -276,7 +276,7 @@ fn what_an_uncalibrated_scene_cannot_do_is_said_with_its_place() {
     let own = "servo scene.toml";
     refuse(&with("[controller]\nkind = \"image-based\""), own, "kind image-based needs a rig");
     refuse(&with("[controller]\nkind = \"hybrid\""), own, "kind hybrid needs a rig");
-    refuse(&with("[limits]\ntip_speed = 1.0"), own, "need a rig");
+    refuse(&with("[limits]\ntip_speed = 1.0"), own, "limit `tip_speed` needs a rig");
     refuse(
         &with("[controller]\nkind = \"uncalibrated\"\nmatrix = \"mean\""),
         own,

@@ -40,6 +40,29 @@ fn what_is_wrong_with_a_scene_of_a_task_is_said_with_its_place() {
             "scene.toml:8:10: controller: `pixels`: is `noise = { pixels = ... }` of the task",
         ),
         (
+            format!("{head}{rest}velocity = []\n"),
+            "scene.toml:6:12: target: `velocity`: has 0 numbers, the rig has 6 joints",
+        ),
+        (
+            format!("{rest}velocity = []\n"),
+            "scene.toml:5:12: target: `velocity`: has no number, and every joint needs one",
+        ),
+        (
+            format!("{head}{rest}[tracker]\npoints = 0.01\n"),
+            "scene.toml:7:10: tracker: `points`: is noise of depth cameras, and the rig has none",
+        ),
+        (
+            format!("{head}{rest}[controller]\nkind = \"uncalibrated\"\n[limits]\ntip_speed = 1\n"),
+            "limit `tip_speed` needs a rig, and servoing of kind uncalibrated is carried out without one",
+        ),
+        (
+            format!(
+                "{head}{rest}path = [[0, 0, 0, 0]]\n{}",
+                fixed.replace("features = [", "features = [{ name = \"idle\", on = \"target\", xyz = [0, 0, 0] }, ")
+            ),
+            "`path`: moves nothing: what a target takes along",
+        ),
+        (
             format!("{head}task = \"wrench\"\n{rest}[limits]\ntip_speed = 1\n"),
             "limit `tip_speed` needs a rig, and a task is carried out without one",
         ),
@@ -72,7 +95,7 @@ fn what_is_wrong_with_a_scene_of_a_task_is_said_with_its_place() {
         ),
         (
             format!("{head}{rest}path = [[0, 0, 0, 0]]\n{fixed}"),
-            "scene.toml:6:8: target: `path`: moves nothing: what a target takes along are features of a task",
+            "scene.toml:6:8: target: `path`: moves nothing: what a target takes along are features on the target",
         ),
         (
             format!("{head}{rest}velocity = [0.1, 0, 0, 0, 0, 0]\n{fixed}"),
@@ -106,7 +129,7 @@ fn what_is_wrong_with_a_scene_of_a_task_is_said_with_its_place() {
     // Three rows for six joints: said before anything moves.
     folder.write("scene.toml", &format!("{head}{rest}[task]\ncameras = [\"left\"]\nfeatures = [{{ name = \"f0\", on = \"hand\" }}, {{ name = \"p\", on = \"target\", xyz = [0,0,0] }}]\ntasks = [{{ kind = \"point-to-point\", point = \"f0\", to = \"p\" }}]\n"));
     let (_, complaint) = folder.expect(2, "servo scene.toml");
-    assert!(complaint.contains('6') && complaint.contains('2'), "{complaint}");
+    assert!(complaint.contains("6 quantities") && complaint.contains("2 rows"), "{complaint}");
 }
 
 #[test]
@@ -148,8 +171,17 @@ fn features_and_cameras_on_a_link_before_the_tip_are_refused_by_scenes_as_by_the
 #[test]
 fn what_a_scene_reads_is_not_written_over() {
     let folder = Folder::new("scene-files");
-    let read = ["rig.toml", "task.toml", "hand.jsonl", "scene.toml"];
-    folder.write("rig.toml", &catalog::rig("ur5").unwrap().to_toml());
+    let read = ["rig.toml", "left.yaml", "task.toml", "hand.jsonl", "scene.toml"];
+    let mut rig = catalog::rig("ur5").unwrap();
+    let left = &mut rig.cameras[0];
+    (left.model, left.fx, left.fy, left.cx, left.cy) = (None, None, None, None, None);
+    let named = "name = \"left\"\n";
+    folder.write("rig.toml", &rig.to_toml().replace(named, &format!("{named}intrinsics = \"left.yaml\"\n")));
+    folder.write(
+        "left.yaml",
+        "image_width: 640\nimage_height: 480\ndistortion_model: plumb_bob\ncamera_matrix: { rows: 3, cols: 3, data: [600, 0, 320, 0, 600, 240, 0, 0, 1] }\n\
+         distortion_coefficients: { rows: 1, cols: 5, data: [0, 0, 0, 0, 0] }\n",
+    );
     let (_, wrench) = image_tasks::catalog::ALL.iter().find(|(name, _)| *name == "wrench").unwrap();
     folder.write("task.toml", wrench);
     let header = "{\"format\":\"handeye-recording\",\"version\":1}\n";

@@ -26,14 +26,14 @@ fn scene(seed: u64, kind: &str) -> Scene {
     let features: String = POINTS.iter().enumerate().map(feature).collect();
     let parts: String = (0..POINTS.len()).map(part).collect();
     let text = format!(
-        "rig = \"ur5\"\n[robot]\nstart = {TARGET:?}\n[tracker]\nsd = 0.3\npoints = 0.002\n[task]\ncameras = [\"left\", \"right\"]\n\
+        "rig = \"ur5\"\n[robot]\nstart = {TARGET:?}\n[tracker]\nsd = 0.3\n[task]\ncameras = [\"left\", \"right\"]\n\
          noise = {{ pixels = 0.3, points = 0.002 }}\nfeatures = [\n{features}]\ntasks = [\n{parts}]\n[target]\njoints = {TARGET:?}\n\
          [loop]\ntolerance_px = 0.6\nwindow = 30\ntimeout = 150\n"
     );
     let mut scene = Scene::parse(&text, "scene.toml", Path::new("")).unwrap();
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     scene.start = TARGET.iter().map(|joint| joint + random.random_range(-0.2..0.2)).collect();
-    scene.world.seed = seed;
+    (scene.world.seed, scene.world.points) = (seed, 0.002);
     scene
 }
 

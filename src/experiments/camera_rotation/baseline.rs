@@ -53,7 +53,7 @@ fn run(options: &Options) -> Result<Outcome, Error> {
         abscissa: Some("angle between the cameras [degrees]"),
         rows,
         notes: vec![
-            format!("iterations are {ITERATIONS} where the errors never sum up to less than 10 px, or diverge"),
+            format!("iterations are {ITERATIONS} where the errors never sum up to less than 10 px, or the loop stops before"),
             "published in words: the condition number is smallest and convergence fastest where the cameras are orthogonal; where they overlap \
              servoing diverges"
                 .to_owned(),
@@ -62,7 +62,7 @@ fn run(options: &Options) -> Result<Outcome, Error> {
     })
 }
 
-/// All of them where the errors never come below 10 px, or diverge.
+/// All of them where the errors never come below 10 px, or the loop stops before.
 fn iterations(run: &Run) -> Option<f64> {
     run.condition.map(|_| run.steps(1).filter(|_| run.stop.is_none()).unwrap_or(ITERATIONS) as f64)
 }
