@@ -44,7 +44,7 @@ pub fn visit(truth: &Rig, recording: &Recording, suggestion: &Suggestion, seed: 
 pub fn gauge_alone(truth: &Rig) -> Rig {
     let fixed = ["robot.base", "cameras.*.pose", "robot.joints.j1.offset", "robot.joints.j1.d", "robot.joints.j6"];
     let prior = [("robot", 10.0), ("features", 10.0)].map(|(path, sd)| (path.to_owned(), sd)).into();
-    Rig { estimate: Estimate { fixed: fixed.map(str::to_owned).into(), prior }, ..truth.clone() }
+    Rig { estimate: Estimate { fixed: fixed.map(str::to_owned).into(), prior, ..Estimate::default() }, ..truth.clone() }
 }
 
 /// Root mean square distance of the learned tip from the true one in 100 fresh positions [m].

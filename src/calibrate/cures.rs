@@ -45,7 +45,10 @@ fn length(honest: &Honest<'_>, [ahead, behind]: &[Model; 2], sd: Option<f64>) ->
         }
     }
     let (change, what) = best?;
-    Some(format!("measure {what}: it is known to {:.1} mm along this", 1e3 * change))
+    Some(format!(
+        "measure {what} (a [[estimate.lengths]] of the rig file): it is known to {:.1} mm along this",
+        1e3 * change
+    ))
 }
 
 /// Joints that moved little, and of which the images would tell more of the direction had they moved further.

@@ -2,6 +2,7 @@
 use super::deviations::Deviations;
 use super::evaluate::{Distances, Errors};
 use super::graph::{State, row};
+use super::lengths;
 use super::observation::Kind;
 use super::outliers::Verdict;
 use super::residuals::distances;
@@ -95,7 +96,7 @@ pub(crate) fn finish(
         gauge,
         noise: None,
         states: setup.states.words(&setup.rig.noise),
-        findings: misfits.chain(unseen).chain(verdict.findings).collect(),
+        findings: misfits.chain(lengths::missed(setup, state)).chain(unseen).chain(verdict.findings).collect(),
         tip: deviations.tip,
         weak: deviations.weak,
         influence: Vec::new(),

@@ -5,6 +5,7 @@
 //! decides these, a rule does: values that would be redundant are held. Points of depth cameras decide the scale.
 use super::deviations::{coordinate_of, intrinsics_of};
 use super::graph::{Freedom, Priors, State, row};
+use super::lengths;
 use super::observation::Kind;
 use super::setup::Setup;
 use crate::chain::{Convention, JointKind, LINK_PARAMETERS, PARALLEL};
@@ -91,7 +92,11 @@ impl Rules<'_> {
     }
 
     fn scale(&mut self, state: &mut State) {
-        if length_is_known(self.setup) {
+        if length_is_given(self.setup) {
+            return;
+        }
+        if let Some(by) = lengths::scale(self.setup, state) {
+            rescale(state, by);
             return;
         }
         let joints = &self.setup.rig.robot.joints;
@@ -104,7 +109,7 @@ impl Rules<'_> {
         self.freedom.parameters[longest] = true;
         let (joint, name) = (longest / LINK_PARAMETERS, NAMES[longest % LINK_PARAMETERS]);
         self.words.push(format!(
-            "lengths are in units of {name} of joint `{}`: nothing that is known is metric",
+            "lengths are in units of {name} of joint `{}`: nothing that is known is metric (one [[estimate.lengths]] of the rig file would do)",
             joints[joint].name
         ));
     }
@@ -215,9 +220,14 @@ fn tip_is_known(setup: &Setup) -> bool {
     setup.chain_is_known() && (cameras || features)
 }
 
+/// Something is a length: a given one, or one that was measured.
+pub(crate) fn length_is_known(setup: &Setup) -> bool {
+    length_is_given(setup) || !setup.lengths.is_empty()
+}
+
 /// Something given is a length: of a link, between cameras, between features, the reading of a sliding joint, or where a depth
 /// camera saw something.
-pub(crate) fn length_is_known(setup: &Setup) -> bool {
+fn length_is_given(setup: &Setup) -> bool {
     let rig = &setup.rig;
     let given = |value: Option<f64>| value.is_some_and(|value| value != 0.0);
     let of_parent = |parent: Parent| {

@@ -1,5 +1,6 @@
 //! The graph of a calibration: which nodes are free is a table, the factors are the same for every stage.
 use super::cameras::KnownIntrinsics;
+use super::lengths;
 use super::observation::Place;
 use super::setup::Setup;
 use super::states::Start;
@@ -189,6 +190,7 @@ pub(crate) fn build(
     }
     if freedom.source != Tips::Seen {
         trunk.measure(loss, &mut built);
+        lengths::measure(setup, loss, &mut built);
     }
     built.add_priors(priors, freedom);
     built

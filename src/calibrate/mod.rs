@@ -14,6 +14,7 @@ mod initialise;
 mod join;
 mod kinematics;
 mod known;
+mod lengths;
 mod leverage;
 mod look;
 mod motion;
@@ -110,6 +111,12 @@ pub fn calibrate(
     observer: Observer<'_>,
 ) -> Result<Calibration, Error> {
     if is_of_targets(recording) {
+        if !rig.estimate.lengths.is_empty() {
+            return Err(Error::Unusable(
+                "`lengths` of [estimate] are measured between features or between cameras, and this is a recording of targets"
+                    .to_owned(),
+            ));
+        }
         return targets::calibrate_targets(rig, recording, options, observer);
     }
     let mut rig = rig.clone();

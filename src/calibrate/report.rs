@@ -1,6 +1,6 @@
 //! What a calibration did and found, and how good it is.
 use super::{CameraErrors, Combination, Influence, PointErrors, TargetReport};
-use crate::rig::{Camera, Noise, Rig};
+use crate::rig::{Camera, Length, Noise, Rig};
 
 /// A learned rig and how it came about.
 #[derive(Clone, Debug)]
@@ -82,6 +82,13 @@ pub enum Finding {
         /// Stated standard deviation of a coordinate.
         stated: Distance,
     },
+    /// A measured length that the learned rig misses by more than three of its standard deviations.
+    MissedLength {
+        /// What was measured.
+        length: Length,
+        /// How long it is in the learned rig [m].
+        learned: f64,
+    },
     /// Single detections were left out.
     Outliers {
         /// How many.
@@ -134,6 +141,13 @@ impl std::fmt::Display for Finding {
                 f,
                 "errors are {ratio:.1} times the stated noise of {stated}: the noise is larger, a lens model or a joint's kind \
                  is wrong, or the fit went astray"
+            ),
+            Finding::MissedLength { length, learned } => write!(
+                f,
+                "{} was measured as {:.2} mm and is {:.2} mm in the learned rig: one of it and the other known lengths is wrong",
+                length.between,
+                1e3 * length.length,
+                1e3 * learned
             ),
             Finding::Outliers { count, of } => write!(f, "{count} of {of} detections do not fit and were left out"),
             Finding::WrongJoints { sample, off, swapped_with, by_pose } => {

@@ -1,6 +1,7 @@
 //! What is known and what was measured, side by side: the rig completed by the recording's header, and its observations.
 use super::cameras::{KnownIntrinsics, complete_camera, leave_out_unseen_cameras};
 use super::evaluate::Correspondence;
+use super::lengths::Found;
 use super::observation::{Kind, Observation, Place};
 use super::states::States;
 use crate::Error;
@@ -26,6 +27,8 @@ pub(crate) struct Setup {
     pub samples: Vec<usize>,
     /// Every detection of a sample that takes part, sample by sample; pixels before points.
     pub observations: Vec<Observation>,
+    /// Ends of the rig's measured lengths, in their order.
+    pub lengths: Vec<Found>,
     /// Names of cameras that are left out: their poses are unknown, and no sample with joints has a detection of theirs.
     pub unseen: Vec<String>,
 }
@@ -69,7 +72,9 @@ impl Setup {
         if observations.is_empty() {
             return Err(Error::NotEnoughData("no sample has a detected feature".into()));
         }
-        Ok(Setup { rig, model, intrinsics, states, samples, observations, unseen })
+        let lengths =
+            rig.estimate.lengths.iter().map(|length| Found::new(&rig, length)).collect::<Result<_, Error>>()?;
+        Ok(Setup { rig, model, intrinsics, states, samples, observations, lengths, unseen })
     }
 
     /// True where every row of the chain is given.

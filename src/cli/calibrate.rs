@@ -297,6 +297,11 @@ pub fn finding_json(finding: &Finding) -> Value {
     let mut json = match finding {
         Finding::UnseenCamera { camera } => json!({ "kind": "unseen_camera", "camera": camera }),
         Finding::Misfit { ratio, stated } => with(json!({ "kind": "misfit", "ratio": ratio }), "stated", stated),
+        Finding::MissedLength { length, learned } => {
+            let (kind, names) = length.between.parts();
+            let ends = names.each_ref().map(|name| format!("{kind}.{name}"));
+            json!({ "kind": "missed_length", "between": ends, "length": length.length, "sd": length.sd, "learned": learned })
+        }
         Finding::Outliers { count, of } => json!({ "kind": "outliers", "count": count, "of": of }),
         Finding::WrongJoints { sample, off, swapped_with, by_pose } => {
             let read = if *by_pose { "pose" } else { "joints" };

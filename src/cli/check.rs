@@ -175,6 +175,10 @@ fn describe(rig: &Rig, file: &str, counts: &Counts) -> String {
     if !targets.is_empty() {
         text += &format!("  targets   {}: {}\n", targets.len(), list(&targets));
     }
+    for length in &rig.estimate.lengths {
+        let (mm, sd) = (1e3 * length.length, 1e3 * length.sd);
+        text += &format!("  measured  {}: {mm:.2} ± {sd:.2} mm\n", length.between);
+    }
     if let Some(fit) = &rig.fit {
         let (samples, rejected) = (count(fit.samples, "sample"), fit.rejected);
         let points = fit.rms_points_m.map_or_else(String::new, |rms| format!(" points {:.3} mm rms,", 1e3 * rms));

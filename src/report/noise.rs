@@ -94,7 +94,10 @@ fn is_left_out(rig: &Rig, residual: &Residual, findings: &[Finding], sds: &[f64]
         Finding::WrongJoints { sample, .. } | Finding::UnknownState { sample } => *sample == residual.sample,
         Finding::WrongImage { sample, camera, .. } => *sample == residual.sample && camera == camera_name,
         Finding::CameraMoved { camera, .. } => camera == camera_name,
-        Finding::Outliers { .. } | Finding::UnseenCamera { .. } | Finding::Misfit { .. } => false,
+        Finding::Outliers { .. }
+        | Finding::UnseenCamera { .. }
+        | Finding::Misfit { .. }
+        | Finding::MissedLength { .. } => false,
     };
     residual.distance() > WRONG * sds[residual.camera].max(rig.noise.pixels) || findings.iter().any(is_meant)
 }

@@ -1,6 +1,7 @@
 //! A rig in memory. `None` is unknown; what is given is a known value or a starting point.
 use crate::camera::CameraModel;
 use crate::chain::{Convention, JointKind};
+use crate::error::suggestion;
 use handeye_solvers::Pose;
 use std::collections::BTreeMap;
 
@@ -204,6 +205,66 @@ pub struct Estimate {
     pub fixed: Vec<String>,
     /// Standard deviation of a Gaussian prior around the given value, by path.
     pub prior: BTreeMap<String, f64>,
+    /// Distances that were measured.
+    pub lengths: Vec<Length>,
+}
+
+/// A distance that was measured, with a ruler or on a drawing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Length {
+    /// Between what.
+    pub between: Ends,
+    /// How long it is [m].
+    pub length: f64,
+    /// Standard deviation of the measurement [m].
+    pub sd: f64,
+}
+
+/// The ends of a [`Length`], by name; both are fixed to the same thing.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Ends {
+    /// Two features.
+    Features([String; 2]),
+    /// The centres of projection of two cameras.
+    Cameras([String; 2]),
+}
+
+impl Ends {
+    /// The word for what they are, and their names.
+    pub fn parts(&self) -> (&'static str, &[String; 2]) {
+        match self {
+            Ends::Features(names) => ("features", names),
+            Ends::Cameras(names) => ("cameras", names),
+        }
+    }
+
+    /// What is wrong with them among the features or cameras of a rig, with what these are fixed to; `None` where nothing is.
+    pub(crate) fn problem(&self, known: &[(&str, Parent)]) -> Option<String> {
+        let (kind, [one, other]) = self.parts();
+        let parent = |end: &String| known.iter().find(|(name, _)| name == end).map(|(_, parent)| *parent);
+        match (parent(one), parent(other)) {
+            _ if one == other => Some(format!("`{kind}.{one}` is at both ends")),
+            (Some(of_one), Some(of_other)) if of_one != of_other => Some(format!(
+                "`{kind}.{one}` and `{kind}.{other}` are not fixed to the same thing, so that their distance changes as the arm moves"
+            )),
+            (Some(_), Some(_)) => None,
+            (one_parent, _) => {
+                let unknown = if one_parent.is_none() { one } else { other };
+                Some(format!(
+                    "there is no `{kind}.{unknown}` {}",
+                    suggestion(unknown, known.iter().map(|(name, _)| *name))
+                ))
+            }
+        }
+    }
+}
+
+/// "the distance between features `a` and `b`"
+impl std::fmt::Display for Ends {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (kind, [one, other]) = self.parts();
+        write!(f, "the distance between {kind} `{one}` and `{other}`")
+    }
 }
 
 /// How a learned rig was learned.

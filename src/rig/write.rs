@@ -5,12 +5,12 @@ mod values;
 
 use super::read::{parse, read_text};
 use super::replace::replace_file;
-use super::{Estimate, Fit, Joint, Rig, Robot};
+use super::{Estimate, Fit, Joint, Length, Rig, Robot};
 use crate::Error;
 use lists::{set_texts, write_list};
 use parts::{write_camera, write_feature, write_joint, write_noise, write_target};
 use std::path::Path;
-use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
+use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, TableLike, Value};
 use values::{Writer, number, numbers, set};
 
 const HEADER: &str =
@@ -148,6 +148,19 @@ fn write_estimate(table: &mut dyn TableLike, before: &Estimate, now: &Estimate) 
         table.remove("prior");
         table.insert("prior", Item::Table(prior));
     }
+    if before.lengths != now.lengths {
+        let lengths: Array = now.lengths.iter().map(length).collect();
+        set(table, "lengths", Value::Array(lengths));
+    }
+}
+
+fn length(given: &Length) -> Value {
+    let (kind, names) = given.between.parts();
+    let mut table = InlineTable::new();
+    table.insert("between", Value::Array(names.iter().map(|name| format!("{kind}.{name}")).collect()));
+    table.insert("length", number(given.length));
+    table.insert("sd", number(given.sd));
+    Value::InlineTable(table)
 }
 
 fn write_fit(table: &mut dyn TableLike, fit: &Fit) {

@@ -188,6 +188,7 @@ fn cameras_that_were_moved_a_little_are_found_again() {
         start.estimate = Estimate {
             fixed: vec!["robot.base".to_owned()],
             prior: [prior(1e-4, "robot"), prior(1e-4, "features")].into(),
+            ..Estimate::default()
         };
         let recording = record(&truth, 30, seed);
         (truth, start, recording)

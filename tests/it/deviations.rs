@@ -117,7 +117,7 @@ fn roughly_known(truth: &Rig, seed: u64) -> Rig {
     ] {
         prior.insert(format!("{names}.*.{field}"), sd);
     }
-    rig.estimate = Estimate { fixed: vec!["robot.base".to_owned()], prior };
+    rig.estimate = Estimate { fixed: vec!["robot.base".to_owned()], prior, ..Estimate::default() };
     rig
 }
 

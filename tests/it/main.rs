@@ -26,6 +26,7 @@ mod infer_rigs;
 mod influence;
 mod intrinsics;
 mod learning;
+mod lengths;
 mod lerobot;
 mod malformed_input;
 mod monitor;

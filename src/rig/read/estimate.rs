@@ -3,12 +3,12 @@ use super::document::{Field, Fields, Node};
 use crate::Error;
 use crate::error::suggestion;
 use crate::rig::paths::{CameraField, JointField, covers, matches};
-use crate::rig::{Estimate, Parameter, Rig};
+use crate::rig::{Ends, Estimate, Length, Parameter, Rig};
 use std::collections::BTreeMap;
 
 /// Paths are checked against the other parts of the rig, which are complete.
 pub(super) fn read_estimate(node: &Node, rig: &Rig) -> Result<Estimate, Error> {
-    let fields = node.clone().table(&["fixed", "prior"])?.labelled("estimate");
+    let fields = node.clone().table(&["fixed", "prior", "lengths"])?.labelled("estimate");
     let fixed = match fields.field("fixed") {
         Some(list) => list.value.list()?,
         None => Vec::new(),
@@ -24,7 +24,49 @@ pub(super) fn read_estimate(node: &Node, rig: &Rig) -> Result<Estimate, Error> {
     Ok(Estimate {
         fixed: fixed.iter().map(|node| read_fixed(node, rig)).collect::<Result<_, Error>>()?,
         prior: prior.unwrap_or_default(),
+        lengths: match fields.field("lengths") {
+            Some(list) => list.value.list()?.iter().map(|node| read_length(node, rig)).collect::<Result<_, Error>>()?,
+            None => Vec::new(),
+        },
     })
+}
+
+/// What a ruler or a drawing tells, where nothing else is said [m].
+const RULER: f64 = 5e-4;
+
+/// `{ between = ["features.A", "features.B"], length = 0.12, sd = 0.0005 }`, or between two cameras.
+fn read_length(node: &Node, rig: &Rig) -> Result<Length, Error> {
+    let fields = node.clone().table(&["between", "length", "sd"])?.labelled("estimate.lengths");
+    let need = |key: &str| fields.field(key).ok_or_else(|| fields.error(format!("has no `{key}`")));
+    Ok(Length {
+        between: read_ends(&need("between")?.value, rig)?,
+        length: need("length")?.value.positive()?,
+        sd: fields.optional("sd", Node::positive)?.unwrap_or(RULER),
+    })
+}
+
+/// Where the rig has no features or cameras of its own, the recording names them.
+fn read_ends(node: &Node, rig: &Rig) -> Result<Ends, Error> {
+    let paths = node.list()?.iter().map(|node| node.text()).collect::<Result<Vec<_>, Error>>()?;
+    let [one, other] = paths.as_slice() else {
+        return Err(node.error(format!("has two ends, as in [\"features.A\", \"features.B\"], found {}", paths.len())));
+    };
+    let both = |prefix: &str| Some([one.strip_prefix(prefix)?.to_owned(), other.strip_prefix(prefix)?.to_owned()]);
+    let features: Vec<_> = rig.features.iter().map(|feature| (feature.name.as_str(), feature.parent)).collect();
+    let cameras: Vec<_> = rig.cameras.iter().map(|camera| (camera.name.as_str(), camera.parent)).collect();
+    let (ends, known) = match (both("features."), both("cameras.")) {
+        (Some(names), _) => (Ends::Features(names), features),
+        (None, Some(names)) => (Ends::Cameras(names), cameras),
+        (None, None) => {
+            return Err(node.error(format!(
+                "is between two features or two cameras, as in [\"features.A\", \"features.B\"], found `{one}` and `{other}`"
+            )));
+        }
+    };
+    match ends.problem(&known) {
+        Some(problem) if !known.is_empty() => Err(node.error(problem)),
+        _ => Ok(ends),
+    }
 }
 
 fn read_fixed(node: &Node, rig: &Rig) -> Result<String, Error> {
