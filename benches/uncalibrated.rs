@@ -4,11 +4,14 @@
 //! `diverged` counts the runs whose errors grew by more than 100 px in a step, `kept` those with the Jacobian kept; `refused` those that were
 //! stopped with the reason that what is seen does not determine the motion. Iterations, image and 3D errors are ratios to those with the
 //! Jacobian kept, over the places where both arrive: mean over the rows, largest, and how many rows are above 1. A row is one scene,
-//! exploratory motion and gain. Last stand the iterations on the reconstructed scene, most of its rows.
+//! exploratory motion and gain. Last stand the iterations on the reconstructed scene, most of its rows. The second table is what the exact
+//! Jacobian of every moment leads to with the same gain and trackers, and no regard for how far it holds: nobody can know it better.
 use cpu_time::ThreadTime;
-use handeye::experiments::camera_rotation::{Run, Scene, Tracker, View, World, carried_around};
+use handeye::experiments::camera_rotation::{ITERATIONS, Run, Scene, Tracker, View, World, carried_around};
 use handeye::servo::LimitRows;
-use handeye::servo::uncalibrated::{Exploration, Phase, Settings, Uncalibrated};
+use handeye::servo::uncalibrated::{Exploration, Phase, Settings, Stop, Uncalibrated};
+use handeye::solvers::nalgebra::{DMatrix, DVector};
+use std::f64::consts::TAU;
 
 const TRACKERS: [(&str, Tracker); 3] =
     [("perfect", Tracker::Perfect), ("rounded", Tracker::Rounded), ("0.2 px", Tracker::Gaussian(0.2))];
@@ -28,35 +31,49 @@ fn main() {
         "{} scenes, {places} places of the cameras, ratios to the Jacobian kept as mean / largest / rows above 1",
         scenes.len()
     );
+    let around = |scene: &Scene, tracker: Tracker, settings: &Settings| {
+        carried_around(scene, tracker, settings, places, 1).expect("settings that may be")
+    };
+    table(&scenes, &around, &|scene, tracker, gain, size| {
+        let settings = Settings { gain, exploration: Exploration::fixed(size), ..Settings::default() };
+        around(scene, tracker, &settings)
+    });
+    println!("\nthe same with the exact Jacobian of every moment");
+    table(&scenes, &around, &|scene, tracker, gain, _| {
+        (0..places).map(|place| with_exact_jacobian(scene, tracker, gain, (place, places))).collect()
+    });
+    time();
+}
+
+/// Runs around the target, of a scene, a tracker, a gain and the size of exploratory motions [rad].
+type Around<'a> = &'a dyn Fn(&Scene, Tracker, f64, f64) -> Vec<Run>;
+
+fn table(scenes: &[Scene], around: &dyn Fn(&Scene, Tracker, &Settings) -> Vec<Run>, ours: Around<'_>) {
     println!(
         "{:8} {:>5} {:>9} {:>9} {:>9} {:>18} {:>18} {:>18} {:>13}",
         "tracker", "gain", "diverged", "refused", "kept", "iterations", "image error", "3D error", "reconstructed"
     );
     for (name, tracker) in TRACKERS {
         for gain in GAINS {
-            row(name, tracker, gain, &scenes, places);
+            let kept = |scene: &Scene, size: f64| around(scene, tracker, &Settings::plain(gain, size));
+            let ours = |scene: &Scene, size: f64| ours(scene, tracker, gain, size);
+            println!("{name:8} {gain:>5} {}", row(scenes, &kept, &ours));
         }
     }
-    time();
 }
 
-fn row(name: &str, tracker: Tracker, gain: f64, scenes: &[Scene], places: usize) {
+fn row(scenes: &[Scene], kept: &dyn Fn(&Scene, f64) -> Vec<Run>, ours: &dyn Fn(&Scene, f64) -> Vec<Run>) -> String {
     let (mut diverged, mut refused, mut diverged_kept) = (0, 0, 0);
     let mut ratios: [Vec<f64>; 3] = Default::default();
     let mut reconstructed = Vec::new();
     for (index, scene) in scenes.iter().enumerate() {
         for size_deg in SIZES_DEG {
-            let size = size_deg.to_radians();
-            let around = |settings: &Settings| {
-                carried_around(scene, tracker, settings, places, 1).expect("settings that may be")
-            };
-            let kept = around(&Settings::plain(gain, size));
-            let ours = around(&Settings { gain, exploration: Exploration::fixed(size), ..Settings::default() });
+            let [kept, ours] = [kept, ours].map(|around| around(scene, size_deg.to_radians()));
             diverged += ours.iter().filter(|run| run.diverged()).count();
             refused += ours.iter().filter(|run| run.stop.is_some() && !run.diverged()).count();
             diverged_kept += kept.iter().filter(|run| run.diverged()).count();
             let arrive = |run: &Run| !run.diverged() && run.steps(1).is_some();
-            let both: Vec<usize> = (0..places).filter(|i| arrive(&kept[*i]) && arrive(&ours[*i])).collect();
+            let both: Vec<usize> = (0..kept.len()).filter(|i| arrive(&kept[*i]) && arrive(&ours[*i])).collect();
             let figures = |runs: &[Run]| -> [f64; 3] {
                 [
                     mean(both.iter().map(|i| runs[*i].steps(1).unwrap_or(0) as f64)),
@@ -82,9 +99,45 @@ fn row(name: &str, tracker: Tracker, gain: f64, scenes: &[Scene], places: usize)
     };
     let worst = reconstructed.iter().copied().fold(0.0, f64::max);
     let [iterations, image, space] = ratios.each_ref().map(cell);
-    println!(
-        "{name:8} {gain:>5} {diverged:>9} {refused:>9} {diverged_kept:>9} {iterations:>18} {image:>18} {space:>18} {worst:>13.2}"
-    );
+    format!("{diverged:>9} {refused:>9} {diverged_kept:>9} {iterations:>18} {image:>18} {space:>18} {worst:>13.2}")
+}
+
+/// Half the distance of the differences that stand for derivatives [rad].
+const STEP: f64 = 1e-6;
+
+/// dq = -λ J⁺ e with J where the arm is; it diverges as the others do.
+fn with_exact_jacobian(scene: &Scene, tracker: Tracker, gain: f64, (place, places): (usize, usize)) -> Run {
+    let views = View::pair(TAU * place as f64 / places as f64);
+    let world = |tracker: Tracker| World::new(scene, &views, tracker, place as u64).expect("the shipped arm");
+    let (mut world, mut exact) = (world(tracker), world(Tracker::Perfect));
+    let mut run = Run { errors: Vec::new(), error_3d: 0.0, condition: None, stop: None };
+    let mut before = Vec::new();
+    let size = |errors: &[f64]| errors.iter().map(|error| error.abs()).sum::<f64>();
+    for _ in 0..=ITERATIONS {
+        let (joints, errors) = (world.joints().to_vec(), world.errors());
+        run.errors.push(size(&errors));
+        let growth = size(&errors) - size(&before);
+        if !before.is_empty() && (growth.is_nan() || growth > Settings::default().divergence) {
+            run.stop = Some(Stop::Diverged { growth });
+            return run;
+        }
+        run.error_3d = world.error_3d();
+        let mut slope = |joint: usize| {
+            let mut there = |by: f64| {
+                let mut there = joints.clone();
+                there[joint] += by;
+                exact.move_to(&there);
+                DVector::from_vec(exact.errors())
+            };
+            (there(STEP) - there(-STEP)) / (2.0 * STEP)
+        };
+        let jacobian = DMatrix::from_columns(&(0..joints.len()).map(&mut slope).collect::<Vec<_>>());
+        let motion = jacobian.svd(true, true).solve(&DVector::from_column_slice(&errors), 0.0).expect("both factors");
+        let there: Vec<f64> = joints.iter().zip(motion.iter()).map(|(joint, motion)| joint - gain * motion).collect();
+        world.move_to(&there);
+        before = errors;
+    }
+    run
 }
 
 fn mean(figures: impl Iterator<Item = f64>) -> f64 {
