@@ -330,7 +330,12 @@ fn a_file_written_over_another_is_whole_and_keeps_its_comments() {
 fn the_shipped_rigs_have_the_joints_of_their_arms() {
     let joints = [
         ("ur5", 6),
+        ("ur5_arm", 6),
+        ("ur5e", 6),
         ("ur3e", 6),
+        ("ur10", 6),
+        ("ur10e", 6),
+        ("iiwa14", 7),
         ("puma560", 6),
         ("wam4", 4),
         ("wam7", 7),
