@@ -75,8 +75,12 @@ impl Recording {
         }
         let found = match rows {
             None => groups.iter().map(|_| Sample::default()).collect(),
-            Some(Rows { states, pairing: Pairing::Order, .. }) => in_order(&groups, order.len(), states)?,
-            Some(Rows { states, names, pairing: Pairing::Name }) => by_name(&groups, &order, states, names)?,
+            Some(Rows { states, pairing: Pairing::Order, .. }) => {
+                taken(&in_order(&groups, order.len(), states)?, states, &mut notes)
+            }
+            Some(Rows { states, names, pairing: Pairing::Name }) => {
+                taken(&by_name(&groups, &order, states, names)?, states, &mut notes)
+            }
             Some(Rows { states, pairing: Pairing::Time, .. }) => {
                 let moment = |group: &Group| Moment { name: &images[group.images[0]].name, time: group.time };
                 at_times(&groups.iter().map(moment).collect::<Vec<_>>(), states, &mut notes)?
@@ -125,29 +129,21 @@ fn numbers(images: &[ImageSeen], order: &[&str]) -> Vec<i64> {
     images.iter().map(|image| numbers[image.name.as_str()]).collect()
 }
 
-/// The rows of groups whose times are numbers of names.
-fn in_order(groups: &[Group], names: usize, states: &Recording) -> Result<Vec<Sample>, String> {
+/// For each group, whose time is the number of its name, the row of that number.
+fn in_order(groups: &[Group], names: usize, states: &Recording) -> Result<Vec<usize>, String> {
     let rows = states.samples.len();
     if rows != names {
         return Err(format!(
             "there are {names} images of each camera and {rows} rows, which do not pair in order (by name or time they might)"
         ));
     }
-    Ok(groups.iter().map(|group| unless_skipped(groups, group, states)).collect())
+    Ok(groups.iter().map(|group| group.time as usize).collect())
 }
 
-/// The row of a group; what is commanded in it leads to the next row, which has to be there.
-fn unless_skipped(groups: &[Group], group: &Group, states: &Recording) -> Sample {
-    let mut row = states.samples[group.time as usize].clone();
-    if !groups.iter().any(|next| next.time == group.time + 1) {
-        (row.joint_action, row.pose_action) = (None, None);
-    }
-    row
-}
-
-fn by_name(groups: &[Group], order: &[&str], states: &Recording, names: &[String]) -> Result<Vec<Sample>, String> {
+/// For each group the row that has its name.
+fn by_name(groups: &[Group], order: &[&str], states: &Recording, names: &[String]) -> Result<Vec<usize>, String> {
     if names.len() != states.samples.len() {
-        return Err("the rows have no names of images (a column `image`)".to_owned());
+        return Err("no row says which image it goes with, as a column `image` of a CSV file would; by order or time they might pair".to_owned());
     }
     let mut rows = BTreeMap::new();
     for (row, name) in names.iter().enumerate() {
@@ -157,12 +153,34 @@ fn by_name(groups: &[Group], order: &[&str], states: &Recording, names: &[String
     }
     let row = |group: &Group| {
         let name = order[group.time as usize];
-        let row = rows.get(name).ok_or_else(|| format!("no row is of the image `{name}`"))?;
-        let mut row = states.samples[*row].clone();
-        (row.joint_action, row.pose_action) = (None, None);
-        Ok(row)
+        rows.get(name).copied().ok_or_else(|| format!("no row is of the image `{name}`"))
     };
     groups.iter().map(row).collect()
+}
+
+/// These rows. What is commanded in one leads to the next row, which has to come next.
+fn taken(rows: &[usize], states: &Recording, notes: &mut Vec<String>) -> Vec<Sample> {
+    let leads = |index: usize| rows.get(index + 1) == Some(&(rows[index] + 1));
+    let mut samples: Vec<Sample> = rows.iter().map(|row| states.samples[*row].clone()).collect();
+    keep_actions(&mut samples, leads, states, notes);
+    samples
+}
+
+/// Keeps what is commanded in samples of which it leads to the next.
+fn keep_actions(samples: &mut [Sample], leads: impl Fn(usize) -> bool, states: &Recording, notes: &mut Vec<String>) {
+    for (_, sample) in samples.iter_mut().enumerate().filter(|(index, _)| !leads(*index)) {
+        (sample.joint_action, sample.pose_action) = (None, None);
+    }
+    let count = |samples: &[Sample]| {
+        samples.iter().filter(|sample| sample.joint_action.is_some() || sample.pose_action.is_some()).count()
+    };
+    let (kept, all) = (count(samples), count(&states.samples));
+    if kept < all {
+        let lost = all - kept;
+        notes.push(format!(
+            "{lost} of {all} commanded motions are left out: they lead from one row to the next, to which no next image belongs"
+        ));
+    }
 }
 
 /// When images were taken [ns], and what the first of them is called.
@@ -176,9 +194,12 @@ fn at_times(images: &[Moment], states: &Recording, notes: &mut Vec<String>) -> R
     let moments: Vec<i64> = images.iter().map(|image| image.time).collect();
     let mut joints: Track<Vec<f64>> = Track::new(moments.len());
     let mut poses: Track<Pose> = Track::new(moments.len());
-    for sample in &states.samples {
+    // Where a row is, and what is commanded in it.
+    let mut row_at: BTreeMap<i64, usize> = BTreeMap::new();
+    for (row, sample) in states.samples.iter().enumerate() {
         let Some(time) = sample.time else { continue };
         let time = (time * 1e9) as i64;
+        row_at.insert(time, row);
         if let Some(read) = &sample.joints {
             joints.add(&moments, time, read);
         }
@@ -227,10 +248,40 @@ fn at_times(images: &[Moment], states: &Recording, notes: &mut Vec<String>) -> R
         let (name, apart) = (images[widest].name, seconds(gap(widest)));
         notes.push(format!("states are interpolated, between two that are up to {apart:.6} s apart (image `{name}`)"));
     }
-    let row = |(joints, pose): (Option<At<Vec<f64>>>, Option<At<Pose>>)| Sample {
-        joints: joints.map(|at| at.value),
-        pose: pose.map(|at| at.value),
-        ..Sample::default()
+    for (what, other, span, count) in [
+        (
+            "joints",
+            "tip pose",
+            spans[0],
+            (0..images.len()).filter(|k| joints[*k].is_none() && poses[*k].is_some()).count(),
+        ),
+        (
+            "tip poses",
+            "joints",
+            spans[1],
+            (0..images.len()).filter(|k| poses[*k].is_none() && joints[*k].is_some()).count(),
+        ),
+    ] {
+        if let Some([first, last]) = span.filter(|_| count > 0) {
+            let (first, last, all) = (seconds(first), seconds(last), images.len());
+            notes.push(format!(
+                "{count} of {all} samples have {other} and no {what}, which were read from {first} s to {last} s"
+            ));
+        }
+    }
+    let row_of = |index: usize| row_at.get(moments.get(index)?).copied();
+    let row = |(index, (joints, pose)): (usize, (Option<At<Vec<f64>>>, Option<At<Pose>>))| {
+        let commanded = row_of(index).map(|row| &states.samples[row]);
+        Sample {
+            joints: joints.map(|at| at.value),
+            pose: pose.map(|at| at.value),
+            joint_action: commanded.and_then(|row| row.joint_action.clone()),
+            pose_action: commanded.and_then(|row| row.pose_action),
+            ..Sample::default()
+        }
     };
-    Ok(joints.into_iter().zip(poses).map(row).collect())
+    let mut samples: Vec<Sample> = joints.into_iter().zip(poses).enumerate().map(row).collect();
+    let leads = |index: usize| row_of(index).is_some_and(|row| row_of(index + 1) == Some(row + 1));
+    keep_actions(&mut samples, leads, states, notes);
+    Ok(samples)
 }
