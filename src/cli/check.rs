@@ -34,6 +34,9 @@ pub struct Check {
 
 impl Check {
     pub fn run(&self, is_json: bool) -> Result<Answer, Error> {
+        if self.recordings.is_empty() {
+            self.reading.refuse_without_recording()?;
+        }
         let input = read_rig(&self.rig)?;
         let RigInput { rig, name, .. } = &input;
         let counts = Counts::new(rig);
