@@ -1,6 +1,7 @@
 //! Reading a rig and the recordings that go with it, and seeing in time that an output can be written.
 use super::answer::remark;
 use super::reading::Reading;
+use super::words::count;
 use crate::error::shipped;
 use crate::recording::is_in_another_order;
 use handeye::Error;
@@ -113,9 +114,8 @@ fn mismatch(input: &RigInput, recording: &Recording, new: &[String]) -> Option<S
     let (ours, theirs) = (rig.robot.joints.len(), recording.joints.len());
     if ours != theirs && ours > 0 {
         let joints = recording.joints.join(", ");
-        return Some(format!(
-            "the recording has {theirs} joints, the rig {name} has {ours}; those of the recording: {joints}"
-        ));
+        let named = if joints.is_empty() { joints } else { format!("; those of the recording: {joints}") };
+        return Some(format!("the recording has {}, the rig {name} has {ours}{named}", count(theirs, "joint")));
     }
     let names: Vec<String> = rig.robot.joints.iter().map(|joint| joint.name.clone()).collect();
     if is_in_another_order(&recording.joints, &names) {

@@ -1,9 +1,8 @@
 //! What images show, with where the robot was at the time.
+use super::at_times::{Moment, at_times};
 use super::groups::{Group, Image, groups, samples};
 use super::names::Names;
-use super::track::{At, Track};
 use super::{RecordedCamera, Recording, Sample};
-use handeye_solvers::Pose;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What one image shows.
@@ -167,7 +166,12 @@ fn taken(rows: &[usize], states: &Recording, notes: &mut Vec<String>) -> Vec<Sam
 }
 
 /// Keeps what is commanded in samples of which it leads to the next.
-fn keep_actions(samples: &mut [Sample], leads: impl Fn(usize) -> bool, states: &Recording, notes: &mut Vec<String>) {
+pub(super) fn keep_actions(
+    samples: &mut [Sample],
+    leads: impl Fn(usize) -> bool,
+    states: &Recording,
+    notes: &mut Vec<String>,
+) {
     for (_, sample) in samples.iter_mut().enumerate().filter(|(index, _)| !leads(*index)) {
         (sample.joint_action, sample.pose_action) = (None, None);
     }
@@ -181,107 +185,4 @@ fn keep_actions(samples: &mut [Sample], leads: impl Fn(usize) -> bool, states: &
             "{lost} of {all} commanded motions are left out: they lead from one row to the next, to which no next image belongs"
         ));
     }
-}
-
-/// When images were taken [ns], and what the first of them is called.
-struct Moment<'a> {
-    name: &'a str,
-    time: i64,
-}
-
-/// Joints and poses at the times of the images, interpolated.
-fn at_times(images: &[Moment], states: &Recording, notes: &mut Vec<String>) -> Result<Vec<Sample>, String> {
-    let moments: Vec<i64> = images.iter().map(|image| image.time).collect();
-    let mut joints: Track<Vec<f64>> = Track::new(moments.len());
-    let mut poses: Track<Pose> = Track::new(moments.len());
-    // Where a row is, and what is commanded in it.
-    let mut row_at: BTreeMap<i64, usize> = BTreeMap::new();
-    for (row, sample) in states.samples.iter().enumerate() {
-        let Some(time) = sample.time else { continue };
-        let time = (time * 1e9) as i64;
-        row_at.insert(time, row);
-        if let Some(read) = &sample.joints {
-            joints.add(&moments, time, read);
-        }
-        if let Some(pose) = &sample.pose {
-            poses.add(&moments, time, pose);
-        }
-    }
-    let spans = [joints.span(), poses.span()];
-    let (Some(first), Some(last)) =
-        (spans.iter().flatten().map(|span| span[0]).min(), spans.iter().flatten().map(|span| span[1]).max())
-    else {
-        return Err("no row has a time and joints or a pose".to_owned());
-    };
-    let (joints, poses) = (joints.at(&moments), poses.at(&moments));
-    let seconds = |nanoseconds: i64| nanoseconds as f64 / 1e9;
-    let is_outside = |index: &usize| joints[*index].is_none() && poses[*index].is_none();
-    let off = |index: usize| (first.saturating_sub(moments[index])).max(moments[index].saturating_sub(last));
-    let outside: Vec<usize> = (0..images.len()).filter(is_outside).collect();
-    if outside.len() == images.len()
-        && let Some(&nearest) = outside.iter().min_by_key(|index| off(**index))
-    {
-        return Err(format!(
-            "no image was taken while the robot was recorded, from {} s to {} s: the nearest, `{}` of {} s, is {} s off",
-            seconds(first),
-            seconds(last),
-            images[nearest].name,
-            seconds(moments[nearest]),
-            seconds(off(nearest))
-        ));
-    }
-    if let Some(&farthest) = outside.iter().max_by_key(|index| off(**index)) {
-        notes.push(format!(
-            "{} of {} samples are outside of the time that the robot was recorded, image `{}` by {} s",
-            outside.len(),
-            images.len(),
-            images[farthest].name,
-            seconds(off(farthest))
-        ));
-    }
-    let gap = |index: usize| {
-        let [joints, pose] = [joints[index].as_ref().map(|at| at.gap), poses[index].as_ref().map(|at| at.gap)];
-        joints.max(pose).unwrap_or(0)
-    };
-    let widest = (0..images.len()).rev().max_by_key(|index| gap(*index)).filter(|index| gap(*index) > 0);
-    if let Some(widest) = widest {
-        let (name, apart) = (images[widest].name, seconds(gap(widest)));
-        notes.push(format!("states are interpolated, between two that are up to {apart:.6} s apart (image `{name}`)"));
-    }
-    for (what, other, span, count) in [
-        (
-            "joints",
-            "tip pose",
-            spans[0],
-            (0..images.len()).filter(|k| joints[*k].is_none() && poses[*k].is_some()).count(),
-        ),
-        (
-            "tip poses",
-            "joints",
-            spans[1],
-            (0..images.len()).filter(|k| poses[*k].is_none() && joints[*k].is_some()).count(),
-        ),
-    ] {
-        if let Some([first, last]) = span.filter(|_| count > 0) {
-            let (first, last, all) = (seconds(first), seconds(last), images.len());
-            notes.push(format!(
-                "{count} of {all} samples have {other} and no {what}, which were read from {first} s to {last} s"
-            ));
-        }
-    }
-    let row_of = |index: usize| row_at.get(moments.get(index)?).copied();
-    let row = |(index, (joints, pose)): (usize, (Option<At<Vec<f64>>>, Option<At<Pose>>))| {
-        let commanded = row_of(index).map(|row| &states.samples[row]);
-        Sample {
-            joints: joints.map(|at| at.value),
-            pose: pose.map(|at| at.value),
-            joint_action: commanded.and_then(|row| row.joint_action.clone()),
-            pose_action: commanded.and_then(|row| row.pose_action),
-            ..Sample::default()
-        }
-    };
-    let mut samples: Vec<Sample> = joints.into_iter().zip(poses).enumerate().map(row).collect();
-    let leads = |index: usize| row_of(index).is_some_and(|row| row_of(index + 1) == Some(row + 1));
-    keep_actions(&mut samples, leads, states, notes);
-    Ok(samples)
 }

@@ -1,4 +1,5 @@
 //! Recordings: what was commanded, read and seen; one file per format.
+mod at_times;
 mod bag;
 mod checked;
 mod clock;

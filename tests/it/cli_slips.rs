@@ -103,7 +103,7 @@ const READERS: [&str; 6] = [
     "evaluate ur5 FILE",
     "infer ur5 FILE",
     "monitor ur5 FILE",
-    "suggest x.toml --count 1 --with FILE",
+    "suggest x.toml --count 1 --rig ur5 --with FILE",
 ];
 
 #[test]

@@ -281,7 +281,7 @@ fn what_was_commanded_stays_where_it_leads_to_the_next_image_and_what_is_lost_is
         let joints: Vec<_> = samples.iter().map(|sample| sample.joints.clone()).collect();
         assert_eq!(joints, [Some(vec![1.0]), Some(vec![2.0]), None], "{how}");
         assert!(samples.iter().all(|sample| sample.pose.is_some()), "{how}");
-        let missing = "1 of 3 samples have tip pose and no joints, which were read from 10 s to 12 s";
+        let missing = "1 of 3 samples have a tip pose and no joints, which were read from 10 s to 12 s";
         assert_eq!(said.contains(missing), how == "time", "{said}");
     }
     // A bag's states belong to its own images.
