@@ -3,7 +3,9 @@ use crate::arrays::{Floats, NewArray, array, rows};
 use crate::errors::{raise, unusable};
 use crate::recording_arrays::{Arrays, read_camera};
 use crate::rig::AnyRig;
-use handeye::recording::{self, Actions, Angles, BagOptions, Format, OpenOptions, RecordedCamera, TableOptions};
+use handeye::recording::{
+    self, Actions, Angles, BagOptions, Format, OpenOptions, Opened, RecordedCamera, TableOptions,
+};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PySlice};
@@ -150,15 +152,9 @@ impl Recording {
             },
             table: TableOptions { angles, actions, episodes: episodes.unwrap_or_default() },
         };
-        let mut notes = Vec::new();
-        let read = py.detach(|| {
-            recording::Recording::read_all_with(&paths, &mut |path| {
-                let opened = recording::Recording::open_with(path, &options)?;
-                notes.extend(opened.notes.iter().map(|note| format!("{}: {note}", path.display())));
-                Ok(opened.recording)
-            })
-        });
-        let inner = Arc::new(read.map_err(raise)?);
+        let read = py.detach(|| recording::Recording::open_all(&paths, &options));
+        let Opened { recording, notes, .. } = read.map_err(raise)?;
+        let inner = Arc::new(recording);
         for note in &notes {
             let text = CString::new(note.replace('\0', " ")).expect("without the byte 0");
             PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;

@@ -34,6 +34,9 @@ pub struct Check {
 
 impl Check {
     pub fn run(&self, is_json: bool) -> Result<Answer, Error> {
+        if self.recordings.is_empty() {
+            self.reading.refuse_without_recording()?;
+        }
         let input = read_rig(&self.rig)?;
         let RigInput { rig, name, .. } = &input;
         let counts = Counts::new(rig);
@@ -107,9 +110,6 @@ fn lines(lines: &[String]) -> String {
     lines.iter().map(|line| format!("  {line}\n")).collect()
 }
 
-/// Beyond so many times what noise alone would leave, a misfit is a mistake or a rig that is not this one.
-const EXPLAINED: f64 = 3.0;
-
 /// The misfit of the data as recorded, in relation to noise.
 fn over_noise(diagnosis: &Diagnosis, noise: &Noise) -> Option<f64> {
     diagnosis.scores.first()?.misfit?.over_noise(noise)
@@ -125,22 +125,22 @@ fn tell(diagnosis: &Diagnosis, noise: &Noise) -> String {
     if let Some(reason) = &diagnosis.unsolved {
         text += &format!("\nnothing can be learned from the data as recorded: {reason}\n");
     }
-    let ratio = over_noise(diagnosis, noise);
     let misfit = diagnosis.scores.first().and_then(|score| score.misfit);
-    let expected = misfit.and_then(|misfit| misfit.of_noise(noise));
-    if let (Some(misfit), Some(expected), Some(ratio)) = (misfit, expected, ratio) {
-        text += &if ratio > EXPLAINED {
-            format!(
-                "\nas recorded it does not fit: {misfit} is {ratio:.0} times the {expected} that the rig's [noise] leaves\n"
-            )
-        } else {
+    let fits = misfit.and_then(|misfit| Some((misfit, misfit.of_noise(noise)?, misfit.over_noise(noise)?)));
+    let fits = fits.map(|(misfit, expected, ratio)| {
+        let is_explained = misfit.is_explained(noise);
+        text += &if is_explained {
             format!("\nas recorded it fits: {misfit}, where the rig's [noise] leaves {expected}\n")
+        } else {
+            format!("\nas recorded it does not fit: {misfit} is {ratio:.1} times the {expected} that the rig's [noise] leaves\n")
         };
-    }
+        is_explained
+    });
     if diagnosis.findings.is_empty() && diagnosis.unsolved.is_none() {
         text += "\nno mistake in units, pairing, axes or sides was found\n";
-        if ratio.is_some_and(|ratio| ratio > EXPLAINED) {
-            text += "what does not fit may be the rig: another robot, numbers held that are wrong, a target that slipped, a camera that moved\n";
+        if fits == Some(false) {
+            text += "what does not fit may be the rig: another robot, numbers held that are wrong, a target that slipped, a camera that moved; or \
+                     its [noise], where less was stated than there is\n";
         }
     }
     for finding in &diagnosis.findings {

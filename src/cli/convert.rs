@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 /// Write a ROS 2 bag, a CSV file or a LeRobot dataset as a recording (JSON Lines)
 ///
-/// Other commands read these files themselves, by the endings of their names, and calibrate, check, evaluate, monitor and suggest take the same
+/// Other commands read these files themselves, by the endings of their names, and calibrate, check, evaluate, infer, monitor and suggest take the same
 /// options.
 ///
 /// Bags (.mcap, or the folder that ros2 bag record makes): features are the corners of AprilTags (apriltag_msgs/AprilTagDetectionArray) and the centres of Detection2D (vision_msgs);

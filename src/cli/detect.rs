@@ -36,7 +36,7 @@ pub struct Detect {
     /// What to look for
     #[arg(long, value_name = "PATTERN", required = true)]
     pattern: Vec<String>,
-    /// Where the robot was: a recording, bag or table
+    /// Where the robot was: a recording or a table
     #[arg(long, value_name = "FILE")]
     states: Option<PathBuf>,
     /// How images find their row of the states
@@ -69,15 +69,23 @@ impl Detect {
         let patterns = self.patterns()?;
         let options = self.reading.options()?;
         let is_bag = |file: &&Path| Format::of(file) == Format::Bag;
+        if let Some(bag) = self.states.as_deref().filter(is_bag) {
+            let bag = bag.display();
+            return Err(Error::Unusable(format!(
+                "--states {bag}: a bag says where the robot was at the stamps of its own images, which `handeye detect {bag}` looks at; for images                  in folders a table or a recording (JSON Lines) says it"
+            )));
+        }
         let images = self.images.iter().map(Path::new);
         let read: Vec<&Path> = images.filter(is_bag).chain(self.states.as_deref()).collect();
         self.reading.refuse_without_effect(&read)?;
         let (mut recording, mut notes) = match (&read[..], &self.images[..]) {
             ([bag], [_]) if self.states.is_none() => in_bag(bag, &patterns, &options)?,
             (read, _) if read.len() == usize::from(self.states.is_some()) => self.in_folders(&patterns, options)?,
-            _ => {
-                let problem = "a bag goes alone, with the states that it has itself";
-                return Err(Error::Unusable(problem.to_owned()));
+            (bags, _) => {
+                let bag = bags[0].display();
+                return Err(Error::Unusable(format!(
+                    "{bag}: a bag is looked at alone, with the states that it has itself: name no other images and no --states beside it"
+                )));
             }
         };
         if recording.samples.is_empty() {
@@ -138,9 +146,10 @@ impl Detect {
             How::Time => Pairing::Time,
         };
         let rows = states.as_ref().map(|opened| Rows { states: &opened.recording, names: &opened.images, pairing });
-        let file = self.states.as_deref().unwrap_or(Path::new("images")).display();
+        let images = self.images.join(", ");
+        let place = self.states.as_ref().map_or(images.clone(), |states| format!("{images} and {}", states.display()));
         let (mut recording, mut notes) = Recording::from_images(cameras, &seen, rows)
-            .map_err(|problem| Error::Unusable(format!("{file}: {problem}")))?;
+            .map_err(|problem| Error::Unusable(format!("{place}: {problem}")))?;
         recording.describe_cameras(&known).map_err(|problem| Error::Unusable(format!("--camera: {problem}")))?;
         notes.extend(states.into_iter().flat_map(|Opened { notes, .. }| notes));
         Ok((recording, notes))

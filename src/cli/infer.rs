@@ -1,7 +1,7 @@
 //! `handeye infer`: joints and tip poses from the pixels of a recording.
 use super::answer::Answer;
 use super::inputs::{read_recordings, read_rig};
-use super::reading::Reading;
+use super::reading::{OfFiles, Reading, What};
 use super::words::count;
 use clap::Args;
 use handeye::Error;
@@ -30,29 +30,32 @@ pub struct Infer {
     /// Recordings of that rig
     #[arg(value_name = "REC", required = true)]
     recordings: Vec<PathBuf>,
-    /// Follow the branches through the recorded joint actions, with the rig's `noise.joint_action`
-    #[arg(long)]
-    actions: bool,
+    /// Follow the branches through the recorded joint actions, with the rig's `noise.joint_action`; of tables, what `action` holds
+    #[arg(long, value_name = "WHAT", num_args = 0..=1, require_equals = true)]
+    actions: Option<Option<What>>,
     /// Use the joint readings too, with the rig's `noise.joints`
     #[arg(long, conflicts_with = "actions")]
     readings: bool,
     /// Shifts the starts of the search: the same seed gives the same answer
     #[arg(long, value_name = "S", default_value_t = InferOptions::default().seed)]
     seed: u64,
+    #[command(flatten)]
+    of_files: OfFiles,
 }
 
 impl Infer {
     pub fn run(&self) -> Result<Answer, Error> {
         let input = read_rig(&self.rig)?;
-        let recording = read_recordings(&self.recordings, Some(&input), &Reading::default())?;
+        let reading = Reading::from((&self.of_files, self.actions.flatten()));
+        let recording = read_recordings(&self.recordings, Some(&input), &reading)?;
         if self.readings && input.rig.noise.joints <= 0.0 {
             let name = &input.name;
             return Err(Error::Unusable(format!(
                 "{name}: --readings needs the noise of the joint readings, `joints` of [noise] above 0"
             )));
         }
-        if self.actions && recording.samples.iter().all(|sample| sample.joint_action.is_none()) {
-            return Err(Error::Unusable("--actions needs samples with `joint_action`, and none has one".to_owned()));
+        if self.actions.is_some() && recording.samples.iter().all(|sample| sample.joint_action.is_none()) {
+            return Err(Error::Unusable("--actions needs samples with `joint_action`, and none has one (--actions=targets or motions says what `action` of a table holds)".to_owned()));
         }
         let options = InferOptions { seed: self.seed, ..InferOptions::default() };
         let mut inference = Inference::new(&input.rig, options)?;
@@ -108,7 +111,7 @@ impl Infer {
 
     /// What the next sample is compared with.
     fn moved<'a>(&self, branches: Option<Vec<Branch>>, sample: &'a Sample) -> Option<(Vec<Branch>, &'a [f64])> {
-        let action = sample.joint_action.as_deref().filter(|_| self.actions)?;
+        let action = sample.joint_action.as_deref().filter(|_| self.actions.is_some())?;
         Some((branches?, action))
     }
 }

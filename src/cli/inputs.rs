@@ -1,6 +1,7 @@
 //! Reading a rig and the recordings that go with it, and seeing in time that an output can be written.
 use super::answer::remark;
 use super::reading::Reading;
+use super::words::count;
 use crate::error::shipped;
 use crate::recording::is_in_another_order;
 use handeye::Error;
@@ -94,21 +95,17 @@ pub fn read_with_notes(
     let known_joints =
         rig.map_or_else(Vec::new, |input| input.rig.robot.joints.iter().map(|joint| joint.name.clone()).collect());
     let options = OpenOptions { known_joints, ..reading.options()? };
-    let mut all_notes = Vec::new();
-    let recording = Recording::read_all_with(paths, &mut |path| {
-        if path.extension().is_some_and(|extension| extension == "toml") && path.is_file() {
-            let problem = format!("{}: that is a rig file, and a recording is expected here", path.display());
-            return Err(Error::Unusable(problem));
-        }
-        let Opened { recording, notes, .. } = Recording::open_with(path, &options)?;
-        all_notes.extend(notes.iter().map(|note| format!("{}: {note}", path.display())));
-        Ok(recording)
-    })?;
+    let is_rig = |path: &&PathBuf| path.extension().is_some_and(|extension| extension == "toml") && path.is_file();
+    if let Some(path) = paths.iter().find(is_rig) {
+        let problem = format!("{}: that is a rig file, and a recording is expected here", path.display());
+        return Err(Error::Unusable(problem));
+    }
+    let Opened { recording, notes, .. } = Recording::open_all(paths, &options)?;
     if let Some(problem) = rig.and_then(|rig| mismatch(rig, &recording, new)) {
         let file = paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
         return Err(Error::Malformed { file, line: 1, column: 1, problem });
     }
-    Ok((recording, all_notes))
+    Ok((recording, notes))
 }
 
 /// Why a recording is not one of this rig.
@@ -116,7 +113,9 @@ fn mismatch(input: &RigInput, recording: &Recording, new: &[String]) -> Option<S
     let RigInput { rig, name, .. } = input;
     let (ours, theirs) = (rig.robot.joints.len(), recording.joints.len());
     if ours != theirs && ours > 0 {
-        return Some(format!("the recording has {theirs} joints, the rig {name} has {ours}"));
+        let joints = recording.joints.join(", ");
+        let named = if joints.is_empty() { joints } else { format!("; those of the recording: {joints}") };
+        return Some(format!("the recording has {}, the rig {name} has {ours}{named}", count(theirs, "joint")));
     }
     let names: Vec<String> = rig.robot.joints.iter().map(|joint| joint.name.clone()).collect();
     if is_in_another_order(&recording.joints, &names) {

@@ -7,7 +7,17 @@ use std::path::Path;
 
 #[derive(Args, Default)]
 pub struct Reading {
-    /// Names of the joints from base to tip [default: those of the first joint state, or of the columns]
+    #[command(flatten)]
+    of_files: OfFiles,
+    /// What `action` holds: positions of the joints to go to, or motions [default: it is left out]
+    #[arg(long, value_name = "WHAT", help_heading = OF_TABLES)]
+    actions: Option<What>,
+}
+
+/// All of them but the one whose name `infer` has for another too.
+#[derive(Args, Clone, Default)]
+pub struct OfFiles {
+    /// Names of the joints from base to tip [default: those of the rig, else of the first joint state or of the columns]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     joints: Vec<String>,
     /// What is known of a camera: the size of its images, or a calibration file (ROS, OpenCV, Kalibr), whose lens replaces any other
@@ -25,8 +35,9 @@ impl Reading {
         let formats: Vec<Format> = files.iter().map(|file| Format::of(file)).collect();
         let has_bag = formats.contains(&Format::Bag);
         let has_table = formats.iter().any(|format| matches!(format, Format::Csv | Format::Parquet | Format::LeRobot));
-        let joints = (!self.joints.is_empty()).then_some("--joints");
-        let without_effect = self.bag.given().filter(|_| !has_bag).or(self.table.given().filter(|_| !has_table));
+        let joints = (!self.of_files.joints.is_empty()).then_some("--joints");
+        let of_table = self.of_table();
+        let without_effect = self.of_files.bag.given().filter(|_| !has_bag).or(of_table.filter(|_| !has_table));
         let Some(option) = without_effect.or(joints.filter(|_| !has_bag && !has_table)) else { return Ok(()) };
         let kind = |format: &Format| match format {
             Format::JsonLines => "a recording",
@@ -39,18 +50,51 @@ impl Reading {
         Err(Error::Unusable(format!("{nothing}, where {option} has no effect")))
     }
 
+    /// Refuses all of them, where there is nothing to read.
+    pub fn refuse_without_recording(&self) -> Result<(), Error> {
+        let OfFiles { joints, camera, bag, .. } = &self.of_files;
+        let of_any = [(!joints.is_empty(), "--joints"), (!camera.is_empty(), "--camera")];
+        let of_any = of_any.into_iter().find(|(is_given, _)| *is_given).map(|(_, name)| name);
+        match of_any.or(bag.given()).or(self.of_table()) {
+            None => Ok(()),
+            Some(option) => Err(Error::Unusable(format!("no recording is read, where {option} has no effect"))),
+        }
+    }
+
+    /// The first option of tables that is given.
+    fn of_table(&self) -> Option<&'static str> {
+        self.of_files.table.given().or(self.actions.map(|_| "--actions"))
+    }
+
     pub fn options(&self) -> Result<OpenOptions, Error> {
+        let OfFiles { joints, camera, bag, table } = &self.of_files;
         Ok(OpenOptions {
-            joints: self.joints.clone(),
+            joints: joints.clone(),
             known_joints: Vec::new(),
-            cameras: self.camera.iter().map(|text| read_camera(text)).collect::<Result<_, _>>()?,
-            bag: self.bag.options(),
-            table: self.table.options(),
+            cameras: camera.iter().map(|text| read_camera(text)).collect::<Result<_, _>>()?,
+            bag: bag.options(),
+            table: TableOptions {
+                angles: table.angles(),
+                actions: match self.actions {
+                    None => Actions::Unsaid,
+                    Some(What::Targets) => Actions::Targets,
+                    Some(What::Motions) => Actions::Motions,
+                },
+                episodes: table.episodes.clone(),
+            },
         })
     }
 }
 
-#[derive(Args, Default)]
+impl From<(&OfFiles, Option<What>)> for Reading {
+    fn from((of_files, actions): (&OfFiles, Option<What>)) -> Self {
+        Reading { of_files: of_files.clone(), actions }
+    }
+}
+
+const OF_TABLES: &str = "Options of tables";
+
+#[derive(Args, Clone, Default)]
 #[command(next_help_heading = "Options of bags")]
 pub struct OfBags {
     /// The topic of joint states, where there are several
@@ -73,8 +117,8 @@ pub struct OfBags {
     join: Option<f64>,
 }
 
-#[derive(Args, Default)]
-#[command(next_help_heading = "Options of tables")]
+#[derive(Args, Clone, Default)]
+#[command(next_help_heading = OF_TABLES)]
 pub struct OfTables {
     /// Take joints for degrees: these, or all
     #[arg(
@@ -89,16 +133,14 @@ pub struct OfTables {
     /// Take joints for radians (or metres) even beyond two turns
     #[arg(long)]
     radians: bool,
-    /// What `action` holds: positions of the joints to go to, or motions [default: it is left out]
-    #[arg(long, value_name = "WHAT")]
-    actions: Option<What>,
     /// The episodes to read [default: all]
     #[arg(long, value_name = "NUMBER,...", value_delimiter = ',')]
     episodes: Vec<u64>,
 }
 
+/// What `action` holds.
 #[derive(Clone, Copy, ValueEnum)]
-enum What {
+pub enum What {
     Targets,
     Motions,
 }
@@ -137,25 +179,16 @@ impl OfTables {
         let options = [
             (self.degrees.is_some(), "--degrees"),
             (self.radians, "--radians"),
-            (self.actions.is_some(), "--actions"),
             (!self.episodes.is_empty(), "--episodes"),
         ];
         options.into_iter().find(|(is_given, _)| *is_given).map(|(_, name)| name)
     }
 
-    fn options(&self) -> TableOptions {
-        TableOptions {
-            angles: match &self.degrees {
-                Some(named) => Angles::Degrees(named.clone()),
-                None if self.radians => Angles::Radians,
-                None => Angles::Unsaid,
-            },
-            actions: match self.actions {
-                None => Actions::Unsaid,
-                Some(What::Targets) => Actions::Targets,
-                Some(What::Motions) => Actions::Motions,
-            },
-            episodes: self.episodes.clone(),
+    fn angles(&self) -> Angles {
+        match &self.degrees {
+            Some(named) => Angles::Degrees(named.clone()),
+            None if self.radians => Angles::Radians,
+            None => Angles::Unsaid,
         }
     }
 }

@@ -52,8 +52,12 @@ impl Suggest {
     pub fn run(&self) -> Result<Answer, Error> {
         let input = read_rig(&self.learned)?;
         let known = self.rig.as_deref().map(read_rig).transpose()?;
-        let recording =
-            if self.with.is_empty() { None } else { Some(read_recordings(&self.with, Some(&input), &self.reading)?) };
+        let recording = if self.with.is_empty() {
+            self.reading.refuse_without_recording()?;
+            None
+        } else {
+            Some(read_recordings(&self.with, Some(&input), &self.reading)?)
+        };
         if let Some(output) = &self.output {
             let inputs = self.with.iter().chain([&self.learned]).chain(&self.rig).cloned().collect::<Vec<_>>();
             check_output(output, &inputs)?;

@@ -182,9 +182,7 @@ fn range(rig: &Rig, recording: &Recording, joint: usize) -> Option<Range> {
     for reading in readings {
         least = reading.min(least);
         largest = reading.max(largest);
-        outside += usize::from(
-            limits.lower.is_some_and(|lower| reading < lower) || limits.upper.is_some_and(|upper| reading > upper),
-        );
+        outside += usize::from(limits.exclude(reading));
     }
     (least <= largest).then(|| Range { name: recording.joints[joint].clone(), least, largest, outside })
 }

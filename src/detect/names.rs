@@ -1,9 +1,6 @@
 //! Names of images, which may be numbers or times.
-use crate::recording::{natural_order, unit_of_date};
+use crate::recording::{LATEST, are_far_apart, natural_order, unit_of_date};
 use std::cmp::Ordering;
-
-/// Beyond it a number is no time in seconds [s].
-const LATEST: f64 = 1e10;
 
 /// What the names of all images are together.
 pub(super) struct Names {
@@ -21,9 +18,15 @@ impl Names {
             None => (number < LATEST).then_some(1.0),
         };
         let first = numbers.clone().next().and_then(unit);
+        let is_of_all = |first: &f64| numbers.clone().all(|number| unit(number) == Some(*first));
+        let is_near = |unit: &f64| {
+            let mut times: Vec<f64> = numbers.clone().map(|number| number * unit).collect();
+            times.sort_by(f64::total_cmp);
+            *unit == 1.0 || !are_far_apart(times.into_iter())
+        };
         Names {
             are_numbers: names.clone().all(|name| number(name).is_some()),
-            unit: first.filter(|first| numbers.clone().all(|number| unit(number) == Some(*first))),
+            unit: first.filter(is_of_all).filter(is_near),
         }
     }
 
@@ -75,6 +78,7 @@ mod tests {
         assert_eq!(time(&["1700000000000", "99"], "99"), None);
         // Nanoseconds of a clock that began with the recording are no seconds, and nothing says what they are.
         assert_eq!(time(&["900000000", "1000000000000"], "900000000"), None);
+        assert_eq!(time(&["1200000000000", "1200033000000", "1200066000000"], "1200033000000"), None);
         assert_eq!(time(&["shot", "0.5"], "shot"), None);
     }
 }

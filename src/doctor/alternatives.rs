@@ -1,11 +1,12 @@
 //! How else data with pixels may have come about: each a rig and a recording with one mistake undone.
-use super::undo;
+use super::{About, undo};
 use crate::chain::JointKind;
 use crate::recording::Recording;
 use crate::rig::{Camera, Feature, Parent, Rig};
 
 /// The data with one mistake undone.
 pub(super) struct Alternative {
+    pub about: About,
     pub name: String,
     pub change: String,
     pub rig: Rig,
@@ -14,7 +15,8 @@ pub(super) struct Alternative {
 
 /// The alternatives that apply.
 pub(super) fn all(rig: &Rig, recording: &Recording) -> Vec<Alternative> {
-    let as_recorded = |name: &str, change: &str| Alternative {
+    let as_recorded = |about: About, name: &str, change: &str| Alternative {
+        about,
         name: name.to_owned(),
         change: change.to_owned(),
         rig: rig.clone(),
@@ -25,8 +27,8 @@ pub(super) fn all(rig: &Rig, recording: &Recording) -> Vec<Alternative> {
     if has_joints {
         all.extend(units(rig, as_recorded));
     } else {
-        for (name, change, undo) in undo::OF_POSES.into_iter().take(2) {
-            let mut alternative = as_recorded(&format!("robot poses are {name}"), change);
+        for (about, name, change, undo) in undo::OF_POSES.into_iter().take(2) {
+            let mut alternative = as_recorded(about, &format!("robot poses are {name}"), change);
             if name == "inverted" {
                 // Pixels alone do not tell the two apart.
                 alternative.change += ", or, if they are right, exchange the parents of cameras and features";
@@ -38,17 +40,20 @@ pub(super) fn all(rig: &Rig, recording: &Recording) -> Vec<Alternative> {
     }
     let rows = if has_joints { "joints" } else { "robot poses" };
     for (name, change, rows) in undo::pairings(rows, recording.samples.len()) {
-        all.push(Alternative { recording: undo::paired(recording, &rows), ..as_recorded(&name, &change) });
+        all.push(Alternative {
+            recording: undo::paired(recording, &rows),
+            ..as_recorded(About::Order, &name, &change)
+        });
     }
     all.extend(other_side(rig, recording).map(|(rig, declared, parent)| {
         let name = format!("cameras that are declared {declared} move as if they were not");
         let change = format!("set the parent of the cameras to \"{parent}\", and that of the features to the other");
-        Alternative { rig, ..as_recorded(&name, &change) }
+        Alternative { rig, ..as_recorded(About::Order, &name, &change) }
     }));
     all
 }
 
-fn units(rig: &Rig, as_recorded: impl Fn(&str, &str) -> Alternative) -> Vec<Alternative> {
+fn units(rig: &Rig, as_recorded: impl Fn(About, &str, &str) -> Alternative) -> Vec<Alternative> {
     let kind = |joint: usize| rig.robot.joints.get(joint).map_or(JointKind::Revolute, |joint| joint.kind);
     let scaled = |mut alternative: Alternative, of: JointKind, factor: f64| {
         for joints in alternative.recording.samples.iter_mut().filter_map(|sample| sample.joints.as_mut()) {
@@ -56,11 +61,15 @@ fn units(rig: &Rig, as_recorded: impl Fn(&str, &str) -> Alternative) -> Vec<Alte
         }
         alternative
     };
-    let degrees = as_recorded("joints are in degrees", "divide the readings of revolute joints by 57.2958");
+    let degrees =
+        as_recorded(About::Units, "joints are in degrees", "divide the readings of revolute joints by 57.2958");
     let mut all = vec![scaled(degrees, JointKind::Revolute, 1f64.to_radians())];
     if rig.robot.joints.iter().any(|joint| joint.kind == JointKind::Prismatic) {
-        let lengths =
-            as_recorded("prismatic joints are in millimetres", "divide the readings of prismatic joints by 1000");
+        let lengths = as_recorded(
+            About::Units,
+            "prismatic joints are in millimetres",
+            "divide the readings of prismatic joints by 1000",
+        );
         all.push(scaled(lengths, JointKind::Prismatic, 1e-3));
     }
     all

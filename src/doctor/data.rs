@@ -1,5 +1,5 @@
 //! What the samples themselves show, without a model.
-use super::Finding;
+use super::{About, Finding};
 use crate::chain::JointKind;
 use crate::recording::{Recording, is_in_another_order};
 use crate::rig::Rig;
@@ -19,12 +19,6 @@ const NOISE: f64 = 0.01;
 /// A joint that moves by less than this [rad, m] stands still.
 const STILL: f64 = 1e-3;
 
-/// What is said of readings beyond limits.
-pub(super) const LIMITS: &str = "outside the rig's limits";
-
-/// How far beyond a limit a joint may be read [rad, m]: encoders are noisy, and limits rounded.
-const BEYOND: f64 = 0.01;
-
 /// No arm reaches so far, and no target is so far away [m].
 const FAR: f64 = 20.0;
 
@@ -42,6 +36,7 @@ pub(super) fn findings(rig: &Rig, recording: &Recording, tips: &[Option<Pose>]) 
 pub(super) fn another_order(rig: &Rig, recording: &Recording) -> Option<Finding> {
     let names: Vec<String> = rig.robot.joints.iter().map(|joint| joint.name.clone()).collect();
     is_in_another_order(&recording.joints, &names).then(|| Finding {
+        about: About::Order,
         what: format!("the joints are in the order {}, those of the rig in another", recording.joints.join(", ")),
         change: format!("put the readings in the rig's order, {}, or read the file with the rig", names.join(", ")),
     })
@@ -55,11 +50,12 @@ fn outside_limits(rig: &Rig, recording: &Recording) -> Vec<Finding> {
         let read: Vec<f64> = read.collect();
         let [lower, upper] =
             [joint.limits.lower.unwrap_or(f64::NEG_INFINITY), joint.limits.upper.unwrap_or(f64::INFINITY)];
-        let n = read.iter().filter(|reading| **reading < lower - BEYOND || **reading > upper + BEYOND).count();
+        let n = read.iter().filter(|reading| joint.limits.exclude(**reading)).count();
         if n > 0 {
             findings.push(Finding {
+                about: About::Limits,
                 what: format!(
-                    "{n} of {} readings of joint `{}` are {LIMITS}, {lower:.3} to {upper:.3}",
+                    "{n} of {} readings of joint `{}` are outside the rig's limits, {lower:.3} to {upper:.3}",
                     read.len(),
                     joint.name
                 ),
@@ -78,6 +74,7 @@ fn repeats(recording: &Recording) -> Option<Finding> {
     let n = read.len();
     let repeats = (0..n).filter(|&k| read[..k].iter().any(|&earlier| states(earlier) == states(read[k]))).count();
     (repeats as f64 > REPEATED * n as f64).then(|| Finding {
+        about: About::Order,
         what: format!("{repeats} of {n} samples repeat the robot's state of an earlier one"),
         change: "record more varied positions".into(),
     })
@@ -96,7 +93,7 @@ fn one_joint(recording: &Recording) -> Option<Finding> {
         [joint] => format!("only joint {} moves", recording.joints[joint]),
         _ => return None,
     };
-    Some(Finding { what, change: "record positions in which all joints differ".into() })
+    Some(Finding { about: About::Order, what, change: "record positions in which all joints differ".into() })
 }
 
 /// All rotations about one axis leave the positions along it open.
@@ -129,7 +126,8 @@ fn one_axis(tips: &[Option<Pose>]) -> Option<Finding> {
             second.to_degrees()
         ),
     };
-    Some(Finding { what, change: "record positions that turn about another axis too, by 30 degrees or more".into() })
+    let change = "record positions that turn about another axis too, by 30 degrees or more".into();
+    Some(Finding { about: About::Turns, what, change })
 }
 
 /// Lengths that only millimetres would explain.
@@ -137,7 +135,9 @@ fn distances(rig: &Rig, recording: &Recording) -> Vec<Finding> {
     let far = |mut lengths: Vec<f64>| !lengths.is_empty() && crate::calibrate::median(&mut lengths) > FAR;
     let samples = &recording.samples;
     let mut findings = Vec::new();
-    let mut add = |what: &str, change: &str| findings.push(Finding { what: what.into(), change: change.into() });
+    let mut add = |what: &str, change: &str| {
+        findings.push(Finding { about: About::Units, what: what.into(), change: change.into() });
+    };
     let positions = "divide their positions by 1000";
     if far(samples.iter().filter_map(|sample| sample.pose).map(|pose| pose.translation.norm()).collect()) {
         add("robot poses are in millimetres", positions);
@@ -152,6 +152,7 @@ fn distances(rig: &Rig, recording: &Recording) -> Vec<Finding> {
         let read: Vec<f64> = samples.iter().filter_map(|s| Some(s.joints.as_ref()?.get(index)?.abs())).collect();
         if far(read) {
             findings.push(Finding {
+                about: About::Units,
                 what: format!("prismatic joint {} is in millimetres", joint.name),
                 change: "divide its readings by 1000".into(),
             });

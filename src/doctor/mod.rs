@@ -16,6 +16,9 @@ use handeye_solvers::Pose;
 /// An alternative is a finding where its misfit is below this share of the misfit as recorded.
 const CLEARLY_BETTER: f64 = 0.5;
 
+/// Up to so many times what noise alone would leave, noise explains a misfit; beyond, it is a mistake or a rig that is not this one.
+const EXPLAINED: f64 = 1.7;
+
 /// Median of the length of three errors of standard deviation 1.
 const MEDIAN_IN_SPACE: f64 = 1.538;
 
@@ -48,9 +51,24 @@ pub struct Score {
     pub misfit: Option<Misfit>,
 }
 
+/// What a finding is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum About {
+    /// Units of joints, poses or points.
+    Units,
+    /// Readings beyond the rig's limits.
+    Limits,
+    /// Turns of the tip that are too few, or all about one axis.
+    Turns,
+    /// How rows go with images and with one another, and how poses, pixels and cameras are written.
+    Order,
+}
+
 /// A mistake in the data, or something that they lack.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
+    /// What it is about.
+    pub about: About,
     /// What is wrong.
     pub what: String,
     /// What to change.
@@ -92,12 +110,7 @@ pub fn examine_watched(
     }
     let tips = tips(rig, recording, f64::to_owned);
     let mut diagnosis = Diagnosis { findings: data::findings(rig, recording, &tips), ..Diagnosis::default() };
-    let is_of_turns = |finding: &Finding| {
-        // A joint may be called anything.
-        let is_of_limits = finding.what.contains(data::LIMITS);
-        !is_of_limits && (finding.what.contains("turn") || finding.what.contains("one axis"))
-    };
-    let turns_freely = !diagnosis.findings.iter().any(is_of_turns);
+    let turns_freely = !diagnosis.findings.iter().any(|finding| finding.about == About::Turns);
     if let Some(pairs) = poses::Pairs::new(rig, recording, &tips).filter(|_| turns_freely) {
         let has_poses = recording.samples.iter().any(|sample| sample.pose.is_some());
         let in_degrees = (!has_poses).then(|| self::tips(rig, recording, |reading| reading.to_radians()));
@@ -109,9 +122,8 @@ pub fn examine_watched(
         pixels::examine(rig, recording, options, &mut diagnosis, watch);
     }
     // Readings in a wrong unit are outside of limits too.
-    if diagnosis.findings.iter().any(|finding| finding.what.contains("degrees") || finding.what.contains("millimetres"))
-    {
-        diagnosis.findings.retain(|finding| !finding.what.contains(data::LIMITS));
+    if diagnosis.findings.iter().any(|finding| finding.about == About::Units) {
+        diagnosis.findings.retain(|finding| finding.about != About::Limits);
     }
     let mut known: Vec<Finding> = Vec::new();
     for finding in std::mem::take(&mut diagnosis.findings) {
@@ -149,6 +161,11 @@ impl Misfit {
     pub fn over_noise(&self, noise: &Noise) -> Option<f64> {
         let ratio = self.size() / self.of_noise(noise)?.size();
         ratio.is_finite().then_some(ratio)
+    }
+
+    /// True where the rig's `[noise]` explains it; never where that is not stated.
+    pub fn is_explained(&self, noise: &Noise) -> bool {
+        self.of_noise(noise).is_some_and(|left| self.size() <= EXPLAINED * left.size())
     }
 
     /// What noise alone would leave of the same kind; `None` where that is not stated. The median distance of Gaussian errors is σ √(2 ln 2) in

@@ -1,17 +1,12 @@
 //! Which reading of joints or tip poses explains the pixels and points: a calibration per alternative.
 use super::alternatives::{self, Alternative};
 use super::images::{self, Axes};
-use super::{Diagnosis, Finding, Misfit, Score, Watch, is_clearly_better, lag};
+use super::{About, Diagnosis, Finding, Misfit, Score, Watch, is_clearly_better, lag};
 use crate::Error;
 use crate::calibrate::{self, Calibration, Errors, Finding as Unfit, calibrate, evaluate};
 use crate::recording::Recording;
-use crate::rig::{Noise, Rig};
+use crate::rig::Rig;
 use std::ops::ControlFlow;
-
-/// Up to this many standard deviations of a coordinate the median distance is explained by noise: of pixels, where 1.18 is its
-/// mean, and of points, where 1.54 is.
-const NOISE: f64 = 2.0;
-const NOISE_OF_POINTS: f64 = 2.6;
 
 /// A lag is told from a shift by whole samples where its misfit is below this share of the shift's.
 const FINER: f64 = 0.8;
@@ -51,11 +46,12 @@ pub(super) fn examine(
     if !suspects.is_empty() {
         let (rig, recording) = images::exchanged_centres(&held, recording, &suspects);
         let name = format!("the principal point of {} has its coordinates swapped", suspects.join(", "));
-        hidden.push(Alternative { name, change: "exchange cx and cy".into(), rig, recording });
+        hidden.push(Alternative { about: About::Order, name, change: "exchange cx and cy".into(), rig, recording });
     }
     if axes == Axes::Open && is_held {
         let (name, change) = (axes_name.into(), axes_change.into());
-        hidden.push(Alternative { name, change, rig: held.clone(), recording: images::exchanged_axes(recording) });
+        let recording = images::exchanged_axes(recording);
+        hidden.push(Alternative { about: About::Order, name, change, rig: held.clone(), recording });
     }
     let mut best: Option<(Misfit, Finding)> = None;
     for alternative in hidden {
@@ -65,7 +61,7 @@ pub(super) fn examine(
         });
         consider(alternative, misfit, reference, &mut best, diagnosis);
     }
-    let explains = |misfit: &Misfit| is_explained(misfit, &rig.noise);
+    let explains = |misfit: &Misfit| misfit.is_explained(&rig.noise);
     let is_fine = |best: &Option<(Misfit, Finding)>| best.as_ref().is_some_and(|(misfit, _)| explains(misfit));
     if !is_fine(&best) && !as_recorded.as_ref().is_some_and(explains) {
         for alternative in alternatives::all(rig, recording) {
@@ -87,7 +83,7 @@ pub(super) fn examine(
             if let Some(misfit) = misfit.filter(|_| is_clearly_better(misfit, as_recorded))
                 && beaten.is_none_or(|beaten| misfit.size() < beaten)
             {
-                best = Some((misfit, Finding { what: name, change }));
+                best = Some((misfit, finding(&name, &change)));
             }
         }
     }
@@ -105,12 +101,12 @@ fn consider(
     best: &mut Option<(Misfit, Finding)>,
     diagnosis: &mut Diagnosis,
 ) {
-    let Alternative { name, change, .. } = alternative;
+    let Alternative { about, name, change, .. } = alternative;
     diagnosis.scores.push(Score { alternative: name.clone(), misfit });
     if let Some(misfit) = misfit.filter(|_| is_clearly_better(misfit, reference))
         && best.as_ref().is_none_or(|(best, _)| misfit.size() < best.size())
     {
-        *best = Some((misfit, Finding { what: name, change }));
+        *best = Some((misfit, Finding { about, what: name, change }));
     }
 }
 
@@ -125,7 +121,7 @@ fn swapped(unfit: &Unfit) -> Option<Finding> {
 }
 
 fn finding(what: &str, change: &str) -> Finding {
-    Finding { what: what.to_owned(), change: change.to_owned() }
+    Finding { about: About::Order, what: what.to_owned(), change: change.to_owned() }
 }
 
 /// Calibrates under a hypothesis.
@@ -164,14 +160,5 @@ pub(super) fn misfit(errors: &Errors) -> Misfit {
         Misfit::Pixels(errors.median_px)
     } else {
         Misfit::Points(errors.points.median_m)
-    }
-}
-
-/// True where noise explains it.
-fn is_explained(misfit: &Misfit, noise: &Noise) -> bool {
-    match misfit {
-        Misfit::Pixels(px) => *px <= NOISE * noise.pixels,
-        Misfit::Points(m) => *m <= NOISE_OF_POINTS * noise.points,
-        Misfit::Poses { .. } => false,
     }
 }

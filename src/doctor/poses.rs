@@ -1,6 +1,6 @@
 //! Robot and targets as two motions: which reading of them agrees with a rigid camera and a rigid target (a X = Z b).
 use super::undo;
-use super::{Finding, Misfit, Score, is_clearly_better};
+use super::{About, Finding, Misfit, Score, is_clearly_better};
 use crate::calibrate::median;
 use crate::geometry::robot_world;
 use crate::recording::Recording;
@@ -46,6 +46,7 @@ struct Fit {
 
 /// One reading of the pairs.
 struct Reading {
+    about: About,
     name: String,
     change: String,
     robot: Vec<Pose>,
@@ -77,14 +78,15 @@ impl Pairs {
 
     /// Scores every reading of the pairs. `in_degrees`: tips from joints read as degrees, where joints are what is known.
     pub fn examine(&self, in_degrees: Option<&[Option<Pose>]>, scores: &mut Vec<Score>, findings: &mut Vec<Finding>) {
-        let reading = |name: &str, change: &str| Reading {
+        let reading = |about: About, name: &str, change: &str| Reading {
+            about,
             name: name.to_owned(),
             change: change.to_owned(),
             robot: self.robot.clone(),
             target: self.target.clone(),
             on_hand: self.on_hand,
         };
-        let recorded = reading("as recorded", "").fit();
+        let recorded = reading(About::Order, "as recorded", "").fit();
         let as_recorded = recorded.as_ref().map(|fit| fit.misfit);
         scores.push(Score { alternative: "as recorded".into(), misfit: as_recorded });
         let mut best: Option<(Misfit, Reading, Fit)> = None;
@@ -113,22 +115,22 @@ impl Pairs {
     fn alternatives(
         &self,
         in_degrees: Option<&[Option<Pose>]>,
-        reading: &impl Fn(&str, &str) -> Reading,
+        reading: &impl Fn(About, &str, &str) -> Reading,
     ) -> Vec<Reading> {
         let mut all = Vec::new();
-        for (name, change, undo) in undo::OF_POSES {
+        for (about, name, change, undo) in undo::OF_POSES {
             let robot = self.robot.iter().map(undo).collect();
-            all.push(Reading { robot, ..reading(&format!("robot poses are {name}"), change) });
+            all.push(Reading { robot, ..reading(about, &format!("robot poses are {name}"), change) });
         }
-        for (name, change, undo) in undo::OF_POSES.into_iter().skip(1) {
+        for (about, name, change, undo) in undo::OF_POSES.into_iter().skip(1) {
             let target = self.target.iter().map(undo).collect();
-            all.push(Reading { target, ..reading(&format!("target poses are {name}"), change) });
+            all.push(Reading { target, ..reading(about, &format!("target poses are {name}"), change) });
         }
         if let Some(tips) = in_degrees {
             let robot = self.samples.iter().map(|sample| tips[*sample].unwrap_or_else(Pose::identity)).collect();
             all.push(Reading {
                 robot,
-                ..reading("joints are in degrees", "divide the readings of revolute joints by 57.2958")
+                ..reading(About::Units, "joints are in degrees", "divide the readings of revolute joints by 57.2958")
             });
         }
         for (name, change, rows) in undo::pairings("robot poses", self.samples.len()) {
@@ -136,7 +138,7 @@ impl Pairs {
                 (0..rows.len()).filter(|i| rows[*i].is_some()).filter_map(|i| Some(poses[index(i)?])).collect()
             };
             let (robot, target) = (of(&self.robot, &|i| rows[i]), of(&self.target, &|i| Some(i)));
-            all.push(Reading { robot, target, ..reading(&name, &change) });
+            all.push(Reading { robot, target, ..reading(About::Order, &name, &change) });
         }
         all
     }
@@ -144,9 +146,9 @@ impl Pairs {
     /// Inverted robot poses, inverted target poses and a camera on the other side of the robot obey the same equation. A camera
     /// sees what is in front of it, and what is mounted on the tip is nearer to it than the rest of the world to the base.
     fn told_apart(&self, found: Reading, fit: &Fit) -> Finding {
-        let Reading { name, change, .. } = found;
+        let Reading { about, name, change, .. } = found;
         if name != INVERTED {
-            return Finding { what: name, change };
+            return Finding { about, what: name, change };
         }
         let off_axis = |poses: &mut dyn Iterator<Item = Pose>| {
             median(&mut poses.map(|pose| pose.translation.xy().norm().atan2(pose.translation.z)).collect::<Vec<_>>())
@@ -156,15 +158,19 @@ impl Pairs {
         // With the poses of the robot inverted, X is on the tip and Z in the world; with the camera elsewhere, the reverse.
         let (on_tip, in_world) = (fit.x.translation.norm(), fit.z.translation.norm());
         if inverted < as_given {
-            return Finding { what: "target poses are inverted".into(), change: "write the inverse of each".into() };
+            return Finding {
+                about,
+                what: "target poses are inverted".into(),
+                change: "write the inverse of each".into(),
+            };
         }
         if on_tip <= in_world {
-            return Finding { what: name, change };
+            return Finding { about, what: name, change };
         }
         let (is, should) = if self.on_hand { ("on the tip", "world") } else { ("in the world", "tip") };
         let camera = &self.camera;
         let what = format!("camera {camera} is declared {is} and moves as if it were not");
-        Finding { what, change: format!("set its parent to \"{should}\"") }
+        Finding { about, what, change: format!("set its parent to \"{should}\"") }
     }
 
     /// Two samples, each of whose robot poses fits the other's image.
@@ -180,6 +186,7 @@ impl Pairs {
             for &j in &wrong[k + 1..] {
                 if misfit(i, j) < EXPLAINED * misfit(i, i) && misfit(j, i) < EXPLAINED * misfit(j, j) {
                     findings.push(Finding {
+                        about: About::Order,
                         what: format!(
                             "the robot poses of samples {} and {} are swapped",
                             self.samples[i], self.samples[j]

@@ -1,16 +1,17 @@
 //! Mistakes of whole recordings, undone: poses that are inverted or written otherwise, rows that belong to other samples.
+use super::About;
 use crate::recording::{Recording, Sample};
 use handeye_solvers::Pose;
 use handeye_solvers::manifold::so3;
 
-/// A mistake of poses: how it is called, what to change, and the change.
-type OfPoses = (&'static str, &'static str, fn(&Pose) -> Pose);
+/// A mistake of poses: what it is about, how it is called, what to change, and the change.
+type OfPoses = (About, &'static str, &'static str, fn(&Pose) -> Pose);
 
 /// What may be wrong with poses.
 pub(super) const OF_POSES: [OfPoses; 3] = [
-    ("inverted", "write the inverse of each", Pose::inverse),
-    ("quaternions in the order w, x, y, z", "write quaternions as [x, y, z, w]", reorder),
-    ("in millimetres", "divide their positions by 1000", metres),
+    (About::Order, "inverted", "write the inverse of each", Pose::inverse),
+    (About::Order, "quaternions in the order w, x, y, z", "write quaternions as [x, y, z, w]", reorder),
+    (About::Units, "in millimetres", "divide their positions by 1000", metres),
 ];
 
 /// The pose whose quaternion was written w first and read w last.

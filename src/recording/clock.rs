@@ -9,7 +9,7 @@ pub(super) const UNITS: [(&str, &str, f64); 4] = [
 ];
 
 /// Beyond it a number is no time in seconds [s]: it would be after the year 2286.
-pub(super) const LATEST: f64 = 1e10;
+pub(crate) const LATEST: f64 = 1e10;
 
 /// The years 2000 to 2100 [s since 1970]: a number of a thousand times as many or more is not between them in any unit but its own.
 const DATES: std::ops::Range<f64> = 946_684_800.0..4_102_444_800.0;
@@ -17,6 +17,15 @@ const DATES: std::ops::Range<f64> = 946_684_800.0..4_102_444_800.0;
 /// The unit in which a number is a date since 1970: its name and its seconds.
 pub(crate) fn unit_of_date(number: f64) -> Option<(&'static str, f64)> {
     UNITS.iter().find(|(_, _, seconds)| DATES.contains(&(number * seconds))).map(|(name, _, seconds)| (*name, *seconds))
+}
+
+/// True where most times are a quarter of an hour or more after the one before: a clock that counts since its start was taken for a date.
+pub(crate) fn are_far_apart(times: impl Iterator<Item = f64>) -> bool {
+    const FAR: f64 = 900.0;
+    let times: Vec<f64> = times.collect();
+    let steps = times.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0);
+    let (far, near): (Vec<f64>, Vec<f64>) = steps.partition(|step| *step > FAR);
+    far.len() > near.len()
 }
 
 #[cfg(test)]

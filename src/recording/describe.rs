@@ -10,12 +10,26 @@ impl Recording {
     ///
     /// Errors, in words: a camera that the recording does not have, and another size than that of its images.
     pub fn describe_cameras(&mut self, known: &[RecordedCamera]) -> Result<(), String> {
+        self.need_cameras(known)?;
+        self.describe_those_there(known)
+    }
+
+    /// Errors, in words: a camera that the recording does not have.
+    pub(super) fn need_cameras(&self, known: &[RecordedCamera]) -> Result<(), String> {
+        let there = || self.cameras.iter().map(|camera| camera.name.as_str());
+        match known.iter().find(|known| !there().any(|name| name == known.name)) {
+            None => Ok(()),
+            Some(RecordedCamera { name, .. }) => {
+                Err(format!("there are no images of a camera `{name}` {}", suggestion(name, there())))
+            }
+        }
+    }
+
+    /// Adds what is known of cameras that the recording has.
+    pub(super) fn describe_those_there(&mut self, known: &[RecordedCamera]) -> Result<(), String> {
         for known in known {
             let name = &known.name;
-            let Some(camera) = self.cameras.iter_mut().find(|camera| camera.name == *name) else {
-                let there = self.cameras.iter().map(|camera| camera.name.as_str());
-                return Err(format!("there are no images of a camera `{name}` {}", suggestion(name, there)));
-            };
+            let Some(camera) = self.cameras.iter_mut().find(|camera| camera.name == *name) else { continue };
             if let (Some(said), Some(found)) = (known.size, camera.size)
                 && said != found
             {

@@ -2,6 +2,7 @@
 use super::names::Names;
 use super::{Detection, Sample};
 use handeye_solvers::Pose;
+use std::collections::BTreeMap;
 
 /// What one image shows.
 pub(super) struct Image {
@@ -31,18 +32,20 @@ pub(super) fn groups(images: &[Image], camera: &[u32], within: Option<i64>) -> V
     order.sort_by_key(|&index| images[index].stamp);
     let within = within.unwrap_or_else(|| usual_period(images, camera, &order) / 2);
     let mut groups: Vec<Vec<usize>> = Vec::new();
+    // The stamp that each camera has in the last group.
+    let mut stamps: BTreeMap<u32, i64> = BTreeMap::new();
     for index in order {
-        let image = &images[index];
-        let fits = |group: &&mut Vec<usize>| {
-            let is_same = |&other: &usize| {
-                camera[images[other].source] == camera[image.source] && images[other].stamp != image.stamp
-            };
-            image.stamp.saturating_sub(images[group[0]].stamp) <= within && !group.iter().any(is_same)
-        };
-        match groups.last_mut().filter(fits) {
+        let Image { stamp, source, .. } = images[index];
+        let is_near = |group: &&mut Vec<usize>| stamp.saturating_sub(images[group[0]].stamp) <= within;
+        let is_first = stamps.get(&camera[source]).is_none_or(|known| *known == stamp);
+        match groups.last_mut().filter(|group| is_first && is_near(group)) {
             Some(group) => group.push(index),
-            None => groups.push(vec![index]),
+            None => {
+                groups.push(vec![index]);
+                stamps.clear();
+            }
         }
+        stamps.insert(camera[source], stamp);
     }
     let group = |group: Vec<usize>| {
         let first = images[group[0]].stamp;

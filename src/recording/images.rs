@@ -1,9 +1,8 @@
 //! What images show, with where the robot was at the time.
+use super::at_times::{Moment, at_times};
 use super::groups::{Group, Image, groups, samples};
 use super::names::Names;
-use super::track::{At, Track};
 use super::{RecordedCamera, Recording, Sample};
-use handeye_solvers::Pose;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What one image shows.
@@ -75,8 +74,12 @@ impl Recording {
         }
         let found = match rows {
             None => groups.iter().map(|_| Sample::default()).collect(),
-            Some(Rows { states, pairing: Pairing::Order, .. }) => in_order(&groups, order.len(), states)?,
-            Some(Rows { states, names, pairing: Pairing::Name }) => by_name(&groups, &order, states, names)?,
+            Some(Rows { states, pairing: Pairing::Order, .. }) => {
+                taken(&in_order(&groups, order.len(), states)?, states, &mut notes)
+            }
+            Some(Rows { states, names, pairing: Pairing::Name }) => {
+                taken(&by_name(&groups, &order, states, names)?, states, &mut notes)
+            }
             Some(Rows { states, pairing: Pairing::Time, .. }) => {
                 let moment = |group: &Group| Moment { name: &images[group.images[0]].name, time: group.time };
                 at_times(&groups.iter().map(moment).collect::<Vec<_>>(), states, &mut notes)?
@@ -125,29 +128,21 @@ fn numbers(images: &[ImageSeen], order: &[&str]) -> Vec<i64> {
     images.iter().map(|image| numbers[image.name.as_str()]).collect()
 }
 
-/// The rows of groups whose times are numbers of names.
-fn in_order(groups: &[Group], names: usize, states: &Recording) -> Result<Vec<Sample>, String> {
+/// For each group, whose time is the number of its name, the row of that number.
+fn in_order(groups: &[Group], names: usize, states: &Recording) -> Result<Vec<usize>, String> {
     let rows = states.samples.len();
     if rows != names {
         return Err(format!(
             "there are {names} images of each camera and {rows} rows, which do not pair in order (by name or time they might)"
         ));
     }
-    Ok(groups.iter().map(|group| unless_skipped(groups, group, states)).collect())
+    Ok(groups.iter().map(|group| group.time as usize).collect())
 }
 
-/// The row of a group; what is commanded in it leads to the next row, which has to be there.
-fn unless_skipped(groups: &[Group], group: &Group, states: &Recording) -> Sample {
-    let mut row = states.samples[group.time as usize].clone();
-    if !groups.iter().any(|next| next.time == group.time + 1) {
-        (row.joint_action, row.pose_action) = (None, None);
-    }
-    row
-}
-
-fn by_name(groups: &[Group], order: &[&str], states: &Recording, names: &[String]) -> Result<Vec<Sample>, String> {
+/// For each group the row that has its name.
+fn by_name(groups: &[Group], order: &[&str], states: &Recording, names: &[String]) -> Result<Vec<usize>, String> {
     if names.len() != states.samples.len() {
-        return Err("the rows have no names of images (a column `image`)".to_owned());
+        return Err("no row says which image it goes with, as a column `image` of a CSV file would; by order or time they might pair".to_owned());
     }
     let mut rows = BTreeMap::new();
     for (row, name) in names.iter().enumerate() {
@@ -157,80 +152,37 @@ fn by_name(groups: &[Group], order: &[&str], states: &Recording, names: &[String
     }
     let row = |group: &Group| {
         let name = order[group.time as usize];
-        let row = rows.get(name).ok_or_else(|| format!("no row is of the image `{name}`"))?;
-        let mut row = states.samples[*row].clone();
-        (row.joint_action, row.pose_action) = (None, None);
-        Ok(row)
+        rows.get(name).copied().ok_or_else(|| format!("no row is of the image `{name}`"))
     };
     groups.iter().map(row).collect()
 }
 
-/// When images were taken [ns], and what the first of them is called.
-struct Moment<'a> {
-    name: &'a str,
-    time: i64,
+/// These rows. What is commanded in one leads to the next row, which has to come next.
+fn taken(rows: &[usize], states: &Recording, notes: &mut Vec<String>) -> Vec<Sample> {
+    let leads = |index: usize| rows.get(index + 1) == Some(&(rows[index] + 1));
+    let mut samples: Vec<Sample> = rows.iter().map(|row| states.samples[*row].clone()).collect();
+    keep_actions(&mut samples, leads, states, notes);
+    samples
 }
 
-/// Joints and poses at the times of the images, interpolated.
-fn at_times(images: &[Moment], states: &Recording, notes: &mut Vec<String>) -> Result<Vec<Sample>, String> {
-    let moments: Vec<i64> = images.iter().map(|image| image.time).collect();
-    let mut joints: Track<Vec<f64>> = Track::new(moments.len());
-    let mut poses: Track<Pose> = Track::new(moments.len());
-    for sample in &states.samples {
-        let Some(time) = sample.time else { continue };
-        let time = (time * 1e9) as i64;
-        if let Some(read) = &sample.joints {
-            joints.add(&moments, time, read);
-        }
-        if let Some(pose) = &sample.pose {
-            poses.add(&moments, time, pose);
-        }
+/// Keeps what is commanded in samples of which it leads to the next.
+pub(super) fn keep_actions(
+    samples: &mut [Sample],
+    leads: impl Fn(usize) -> bool,
+    states: &Recording,
+    notes: &mut Vec<String>,
+) {
+    for (_, sample) in samples.iter_mut().enumerate().filter(|(index, _)| !leads(*index)) {
+        (sample.joint_action, sample.pose_action) = (None, None);
     }
-    let spans = [joints.span(), poses.span()];
-    let (Some(first), Some(last)) =
-        (spans.iter().flatten().map(|span| span[0]).min(), spans.iter().flatten().map(|span| span[1]).max())
-    else {
-        return Err("no row has a time and joints or a pose".to_owned());
+    let count = |samples: &[Sample]| {
+        samples.iter().filter(|sample| sample.joint_action.is_some() || sample.pose_action.is_some()).count()
     };
-    let (joints, poses) = (joints.at(&moments), poses.at(&moments));
-    let seconds = |nanoseconds: i64| nanoseconds as f64 / 1e9;
-    let is_outside = |index: &usize| joints[*index].is_none() && poses[*index].is_none();
-    let off = |index: usize| (first.saturating_sub(moments[index])).max(moments[index].saturating_sub(last));
-    let outside: Vec<usize> = (0..images.len()).filter(is_outside).collect();
-    if outside.len() == images.len()
-        && let Some(&nearest) = outside.iter().min_by_key(|index| off(**index))
-    {
-        return Err(format!(
-            "no image was taken while the robot was recorded, from {} s to {} s: the nearest, `{}` of {} s, is {} s off",
-            seconds(first),
-            seconds(last),
-            images[nearest].name,
-            seconds(moments[nearest]),
-            seconds(off(nearest))
-        ));
-    }
-    if let Some(&farthest) = outside.iter().max_by_key(|index| off(**index)) {
+    let (kept, all) = (count(samples), count(&states.samples));
+    if kept < all {
+        let lost = all - kept;
         notes.push(format!(
-            "{} of {} samples are outside of the time that the robot was recorded, image `{}` by {} s",
-            outside.len(),
-            images.len(),
-            images[farthest].name,
-            seconds(off(farthest))
+            "{lost} of {all} commanded motions are left out: they lead from one row to the next, to which no next image belongs"
         ));
     }
-    let gap = |index: usize| {
-        let [joints, pose] = [joints[index].as_ref().map(|at| at.gap), poses[index].as_ref().map(|at| at.gap)];
-        joints.max(pose).unwrap_or(0)
-    };
-    let widest = (0..images.len()).rev().max_by_key(|index| gap(*index)).filter(|index| gap(*index) > 0);
-    if let Some(widest) = widest {
-        let (name, apart) = (images[widest].name, seconds(gap(widest)));
-        notes.push(format!("states are interpolated, between two that are up to {apart:.6} s apart (image `{name}`)"));
-    }
-    let row = |(joints, pose): (Option<At<Vec<f64>>>, Option<At<Pose>>)| Sample {
-        joints: joints.map(|at| at.value),
-        pose: pose.map(|at| at.value),
-        ..Sample::default()
-    };
-    Ok(joints.into_iter().zip(poses).map(row).collect())
 }

@@ -84,22 +84,13 @@ impl Recording {
         self.samples.append(&mut next.samples);
     }
 
-    /// The index of a camera, of which everything is noted that was not known.
+    /// The index of a camera, of which its lens and its size are noted where they were not known.
     fn take_in(&mut self, camera: &RecordedCamera) -> u32 {
         let index = self.cameras.iter().position(|known| known.name == camera.name).unwrap_or(self.cameras.len());
         if index == self.cameras.len() {
             self.cameras.push(camera.clone());
         }
-        let known = &mut self.cameras[index];
-        known.size = known.size.or(camera.size);
-        known.model = known.model.or(camera.model);
-        known.fx = known.fx.or(camera.fx);
-        known.fy = known.fy.or(camera.fy);
-        known.cx = known.cx.or(camera.cx);
-        known.cy = known.cy.or(camera.cy);
-        if known.distortion.is_none() {
-            known.distortion.clone_from(&camera.distortion);
-        }
+        self.cameras[index] = self.cameras[index].over(camera);
         index as u32
     }
 }

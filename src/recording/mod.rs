@@ -1,4 +1,5 @@
 //! Recordings: what was commanded, read and seen; one file per format.
+mod at_times;
 mod bag;
 mod checked;
 mod clock;
@@ -17,7 +18,7 @@ mod track;
 mod types;
 
 pub use bag::{BagOptions, Detect, Found};
-pub(crate) use clock::unit_of_date;
+pub(crate) use clock::{LATEST, are_far_apart, unit_of_date};
 pub use command::Command;
 pub(crate) use describe::px;
 pub use images::{ImageSeen, Pairing, Rows};

@@ -45,6 +45,11 @@ pub(super) fn tidy(name: &str) -> String {
     if name.is_empty() { "unnamed".to_owned() } else { name }
 }
 
+/// A joint's name as parameter paths can hold it: LeRobot's `shoulder_pan.pos` is the position of `shoulder_pan`.
+pub(super) fn joint_name(name: &str) -> String {
+    tidy(name.strip_suffix(".pos").unwrap_or(name))
+}
+
 /// Digits count as numbers: `f2` comes before `f10`.
 pub(crate) fn natural_order(a: &str, b: &str) -> Ordering {
     let (mut left, mut right) = (a, b);

@@ -1,7 +1,7 @@
 //! A recording in whatever format its file's ending names.
 use super::{BagOptions, RecordedCamera, Recording, TableOptions, bag, table};
 use crate::Error;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The formats that are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,7 +60,7 @@ pub struct OpenOptions {
 pub struct Opened {
     /// The recording.
     pub recording: Recording,
-    /// What was left out, taken for granted or interpolated, and where the file ends early: one line each. Nothing where it was written by handeye.
+    /// What was left out, taken for granted, interpolated or put into the order of known joints, and where the file ends early: one line each.
     pub notes: Vec<String>,
     /// For each sample the name of the image that it goes with, without folder and ending, where a CSV file has a column `image`; otherwise empty.
     pub images: Vec<String>,
@@ -72,26 +72,47 @@ impl Recording {
     /// Errors: those of [`Recording::read`]; [`Error::Malformed`] with line and column of a CSV file; [`Error::Unusable`] with row and column of
     /// a Parquet file, with topic and message of a bag, and for options that name what the file does not have.
     pub fn open_with(path: &Path, options: &OpenOptions) -> Result<Opened, Error> {
-        match Format::of(path) {
-            Format::JsonLines => {
-                let mut recording = Recording::read(path)?;
-                let described = recording.describe_cameras(&options.cameras);
-                described.map_err(|problem| Error::Unusable(format!("{}: {problem}", path.display())))?;
-                let order = recording.joints.join(", ");
-                let is_ordered = recording.order_joints(&options.known_joints);
-                let note = || {
-                    let ours = recording.joints.join(", ");
-                    format!(
-                        "joints are taken by their names, in the order of the rig: {ours}; the file has them in the order {order}"
-                    )
-                };
-                let notes = is_ordered.then(note).into_iter().collect();
-                Ok(Opened { recording, notes, images: Vec::new() })
-            }
-            Format::Bag => bag::read(path, options, None),
-            Format::Csv => table::read_csv(path, options),
-            Format::Parquet => table::read_parquet(path, options),
-            Format::LeRobot => table::read_lerobot(path, options),
+        let opened = open(path, options)?;
+        opened.with_cameras(&path.display().to_string(), options)
+    }
+
+    /// Reads several recordings as [`Recording::open_with`] does and joins them as [`Recording::read_all`] does. What the options say of a camera is
+    /// said of it in every file that has it, and each note begins with its file.
+    ///
+    /// Errors: those of both.
+    pub fn open_all(paths: &[PathBuf], options: &OpenOptions) -> Result<Opened, Error> {
+        let mut all_notes = Vec::new();
+        let recording = Recording::read_all_with(paths, &mut |path| {
+            let Opened { recording, notes, .. } = open(path, options)?;
+            all_notes.extend(notes.iter().map(|note| format!("{}: {note}", path.display())));
+            Ok(recording)
+        })?;
+        let files = paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
+        Opened { recording, notes: all_notes, images: Vec::new() }.with_cameras(&files, options)
+    }
+}
+
+impl Opened {
+    /// Errors: [`Error::Unusable`] where the options say something of a camera that is not there.
+    pub(super) fn with_cameras(self, files: &str, options: &OpenOptions) -> Result<Opened, Error> {
+        let problem = self.recording.need_cameras(&options.cameras).err();
+        problem.map_or(Ok(self), |problem| Err(Error::Unusable(format!("{files}: {problem}"))))
+    }
+}
+
+/// The same where cameras of which the options say something may be missing.
+fn open(path: &Path, options: &OpenOptions) -> Result<Opened, Error> {
+    match Format::of(path) {
+        Format::JsonLines => {
+            let mut recording = Recording::read(path)?;
+            let described = recording.describe_those_there(&options.cameras);
+            described.map_err(|problem| Error::Unusable(format!("{}: {problem}", path.display())))?;
+            let notes = recording.take_joints(&options.known_joints);
+            Ok(Opened { recording, notes, images: Vec::new() })
         }
+        Format::Bag => bag::read(path, options, None),
+        Format::Csv => table::read_csv(path, options),
+        Format::Parquet => table::read_parquet(path, options),
+        Format::LeRobot => table::read_lerobot(path, options),
     }
 }

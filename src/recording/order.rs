@@ -2,21 +2,37 @@
 use super::Recording;
 
 impl Recording {
-    /// Puts the joints into the order of `names`, where they have just these names in another one, and says whether they had.
-    pub(super) fn order_joints(&mut self, names: &[String]) -> bool {
-        if !is_in_another_order(&self.joints, names) {
-            return false;
-        }
-        let place = |name: &String| self.joints.iter().position(|joint| joint == name).unwrap_or_default();
-        let places: Vec<usize> = names.iter().map(place).collect();
-        let ordered = |row: &Vec<f64>| places.iter().map(|place| row[*place]).collect::<Vec<f64>>();
+    /// Takes the joints of these names in this order, where the recording has all of them and not just so; what has to be said of it.
+    pub(super) fn take_joints(&mut self, names: &[String]) -> Vec<String> {
+        let place = |name: &String| self.joints.iter().position(|joint| joint == name);
+        let places: Option<Vec<usize>> = names.iter().map(place).collect();
+        let Some(places) = places.filter(|_| !names.is_empty() && self.joints != names && are_different(names)) else {
+            return Vec::new();
+        };
+        let taken = |row: &Vec<f64>| places.iter().map(|place| row[*place]).collect::<Vec<f64>>();
         for sample in &mut self.samples {
-            sample.joints = sample.joints.as_ref().map(ordered);
-            sample.joint_action = sample.joint_action.as_ref().map(ordered);
+            sample.joints = sample.joints.as_ref().map(taken);
+            sample.joint_action = sample.joint_action.as_ref().map(taken);
         }
-        self.joints = names.to_vec();
-        true
+        let before = std::mem::replace(&mut self.joints, names.to_vec());
+        let order = (!places.is_sorted()).then(|| {
+            let (ours, theirs) = (names.join(", "), before.join(", "));
+            format!("joints are taken by their names, in the order of the rig: {ours}; the file has them in the order {theirs}")
+        });
+        order.into_iter().chain(note_on_others(&before, names)).collect()
     }
+}
+
+/// What is said of joints that a file has beside those that are taken.
+pub(super) fn note_on_others<'a>(all: impl IntoIterator<Item = &'a String>, taken: &[String]) -> Option<String> {
+    let mut others: Vec<&str> = Vec::new();
+    for name in all {
+        if !taken.contains(name) && !others.contains(&name.as_str()) {
+            others.push(name);
+        }
+    }
+    let (taken, others_listed) = (taken.join(", "), others.join(", "));
+    (!others.is_empty()).then(|| format!("joints that are left out: {others_listed}; those that are taken: {taken}"))
 }
 
 /// True where both lists hold the same names, which differ from each other, and not in the same order.
@@ -26,6 +42,9 @@ pub(crate) fn is_in_another_order(joints: &[String], names: &[String]) -> bool {
         names.sort();
         names
     };
-    let sorted_names = sorted(names);
-    joints != names && sorted(joints) == sorted_names && sorted_names.windows(2).all(|pair| pair[0] != pair[1])
+    joints != names && sorted(joints) == sorted(names) && are_different(names)
+}
+
+fn are_different(names: &[String]) -> bool {
+    names.iter().enumerate().all(|(index, name)| !names[..index].contains(name))
 }

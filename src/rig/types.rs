@@ -81,6 +81,15 @@ pub struct Limits {
     pub acceleration: Option<f64>,
 }
 
+impl Limits {
+    /// True for a reading that the joint could not have had: encoders are noisy and limits rounded, by 0.01 rad or m at most.
+    pub(crate) fn exclude(&self, reading: f64) -> bool {
+        const BEYOND: f64 = 0.01;
+        self.lower.is_some_and(|lower| reading < lower - BEYOND)
+            || self.upper.is_some_and(|upper| reading > upper + BEYOND)
+    }
+}
+
 /// What a camera, a feature or a target is fixed to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Parent {

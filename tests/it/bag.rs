@@ -14,12 +14,12 @@ pub mod cdr;
 
 use cdr::Cdr;
 
-const HEADER: &str = "std_msgs/Header header\n";
-const HEADER_PARTS: &str = "================================================================================\n\
+pub const HEADER: &str = "std_msgs/Header header\n";
+pub const HEADER_PARTS: &str = "================================================================================\n\
     MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n\
     ================================================================================\n\
     MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n";
-const JOINTS: &str = "string[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n";
+pub const JOINTS: &str = "string[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n";
 const INFO: &str = "uint32 height\nuint32 width\nstring distortion_model\nfloat64[] d\nfloat64[9] k\nfloat64[9] r\nfloat64[12] p\n\
     uint32 binning_x\nuint32 binning_y\nsensor_msgs/RegionOfInterest roi\n";
 const INFO_PARTS: &str = "================================================================================\n\
@@ -31,7 +31,7 @@ const TAGS_PARTS: &str = "======================================================
     ================================================================================\n\
     MSG: apriltag_msgs/Point\nfloat64 x\nfloat64 y\n";
 
-fn joint_state(stamp: u64, names: &[String], positions: &[f64]) -> Vec<u8> {
+pub fn joint_state(stamp: u64, names: &[String], positions: &[f64]) -> Vec<u8> {
     let mut cdr = Cdr::stamped(stamp, "");
     cdr.int(names.len() as u32);
     names.iter().for_each(|name| cdr.text(name));
@@ -139,7 +139,7 @@ fn read(bytes: &[u8], folder: &Folder) -> Result<Opened, handeye::Error> {
     read_with(bytes, folder, &OpenOptions { known_joints, ..OpenOptions::default() })
 }
 
-fn read_with(bytes: &[u8], folder: &Folder, options: &OpenOptions) -> Result<Opened, handeye::Error> {
+pub fn read_with(bytes: &[u8], folder: &Folder, options: &OpenOptions) -> Result<Opened, handeye::Error> {
     std::fs::write(folder.path().join("bag.mcap"), bytes).unwrap();
     Recording::open_with(&folder.path().join("bag.mcap"), options)
 }
@@ -160,7 +160,7 @@ const SPACE: &str = "===========================================================
     MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n";
 
 /// An image of one tag each 0.1 s from 1 s on, and the messages beside: topic, type, schema, time [ns] and bytes.
-fn images_beside(n: u64, others: &[(&str, &str, String, u64, Vec<u8>)]) -> Vec<u8> {
+pub fn images_beside(n: u64, others: &[(&str, &str, String, u64, Vec<u8>)]) -> Vec<u8> {
     let mut writer = WriteOptions::new().create(Cursor::new(Vec::new())).unwrap();
     let mut write = |topic: &str, kind: &str, text: &str, time: u64, data: &[u8]| {
         let schema = writer.add_schema(kind, "ros2msg", text.as_bytes()).unwrap();
@@ -245,36 +245,6 @@ fn states_are_interpolated_to_the_stamps_of_images_and_those_outside_are_left_op
 }
 
 #[test]
-fn states_of_an_arm_and_a_gripper_on_one_topic_are_told_apart_and_those_without_positions_say_nothing() {
-    let folder = Folder::new("bag-two-publishers");
-    let state = format!("{HEADER}{JOINTS}{HEADER_PARTS}");
-    let [arm, gripper] = [["a", "b"], ["finger", "thumb"]].map(|names| names.map(str::to_owned));
-    let mut others = Vec::new();
-    // Every 25 ms, in turns; the arm's joints are the time and its half. The first one has no positions.
-    for index in 0..20_u64 {
-        let time = 900_000_000 + 25_000_000 * index;
-        let seconds = time as f64 / 1e9;
-        let bytes = match index {
-            0 => joint_state(time, &arm, &[]),
-            _ if index % 2 == 0 || index == 1 => joint_state(time, &arm, &[seconds, 0.5 * seconds]),
-            _ => joint_state(time, &gripper, &[100.0, 200.0]),
-        };
-        others.push(("/joint_states", "sensor_msgs/msg/JointState", state.clone(), time, bytes));
-    }
-    // Recorders write what comes late behind what came after it.
-    others[8..].reverse();
-    let Opened { recording, notes, .. } =
-        read_with(&images_beside(4, &others), &folder, &OpenOptions::default()).unwrap();
-    assert_eq!(recording.joints, ["a", "b"]);
-    for (index, sample) in recording.samples.iter().enumerate() {
-        let seconds = 1.0 + 0.1 * index as f64;
-        let [a, b] = sample.joints.as_ref().unwrap()[..] else { panic!() };
-        assert!((a - seconds).abs() < 1e-9 && (b - 0.5 * seconds).abs() < 1e-9, "{a} {b} at {seconds}");
-    }
-    assert!(notes.iter().any(|note| note.contains("10 joint states lack a joint or a position")), "{notes:?}");
-}
-
-#[test]
 fn the_tip_is_found_in_the_tree_of_frames_and_a_way_that_is_not_there_is_refused() {
     let folder = Folder::new("bag-frames");
     let text = format!("{TRANSFORMS}{HEADER_PARTS}{SPACE}");
@@ -311,6 +281,7 @@ fn the_tip_is_found_in_the_tree_of_frames_and_a_way_that_is_not_there_is_refused
     }
     let error = read_with(&bytes, &folder, &frames("gripper")).unwrap_err().to_string();
     assert!(error.contains("no way from `base` to `gripper`") && error.contains("arm, base, tip"), "{error}");
+    assert!(error.ends_with("--base-frame and --tip-frame name two that hang together"), "{error}");
 }
 
 #[test]
@@ -411,14 +382,24 @@ fn what_a_bag_lacks_is_said_with_what_it_has() {
     let folder = Folder::new("bag-mistakes");
     let recording = recorded();
     std::fs::write(folder.path().join("bag.mcap"), bag(&recording, WriteOptions::new(), false)).unwrap();
-    let (_, error) = folder.expect(2, "convert bag.mcap --joint-topic /nowhere -o out.jsonl");
-    assert!(error.contains("/nowhere") && error.contains("/joint_states"), "{error}");
-    let (_, error) = folder.expect(2, "convert bag.mcap --camera-topic /nowhere -o out.jsonl");
-    assert!(error.contains("bag.mcap") && error.contains("/joint_states"), "{error}");
     folder.write("no.mcap", "{\"format\":\"handeye-recording\"}");
-    let (_, error) = folder.expect(2, "convert no.mcap -o out.jsonl");
-    assert!(error.contains("no.mcap"), "{error}");
-    assert!(!Path::new(&folder.path().join("out.jsonl")).exists());
+    for (arguments, says) in [
+        (
+            "bag.mcap --joint-topic /nowhere",
+            "bag.mcap: --joint-topic names `/nowhere`, on which there are no such messages; there are /joint_states (",
+        ),
+        (
+            "bag.mcap --camera-topic /nowhere",
+            "bag.mcap: has no image with features (apriltag_msgs/AprilTagDetectionArray or vision_msgs/Detection2DArray) on the topics of \
+             --camera-topic; it has /joint_states (",
+        ),
+        ("bag.mcap --joints elbow,wrist_9", "bag.mcap: /joint_states: has no joint `wrist_9`; it has shoulder_pan, "),
+        ("no.mcap", "no.mcap: is no MCAP file\n"),
+    ] {
+        let (_, error) = folder.expect(2, &format!("convert {arguments} -o out.jsonl"));
+        assert!(error.starts_with(&format!("error: {says}")), "{arguments}: {error}");
+    }
+    assert!(!folder.path().join("out.jsonl").exists());
 }
 
 /// The bag in two files, the second of which has its own numbers of channels, in the folder that ROS 2 makes.

@@ -1,5 +1,6 @@
 //! What bags say of cameras, and of which images it is.
 use crate::bag::cdr::Cdr;
+use crate::bag::{images_beside, read_with};
 use crate::cli::Folder;
 use handeye::camera::CameraModel;
 use handeye::recording::{Found, OpenOptions, Opened, RecordedCamera, Recording};
@@ -19,11 +20,15 @@ type Message = (&'static str, &'static str, String, Cdr);
 
 /// A CameraInfo of 640 x 480 px, with a K and a P that differ.
 fn info(topic: &'static str, frame: &str, binning: u32) -> Message {
+    info_of(topic, frame, binning, "plumb_bob")
+}
+
+fn info_of(topic: &'static str, frame: &str, binning: u32, model: &str) -> Message {
     let mut cdr = Cdr::new(false);
     cdr.header(0, 0, frame);
     cdr.int(480);
     cdr.int(640);
-    cdr.text("plumb_bob");
+    cdr.text(model);
     cdr.int(5);
     cdr.floats(&[-0.25, 0.125, 0.0, 0.0, 0.0]);
     cdr.floats(&[600.0, 0.0, 319.0, 0.0, 601.0, 239.0, 0.0, 0.0, 1.0]);
@@ -114,6 +119,11 @@ fn images_of_another_size_than_the_camera_info_are_refused_with_both_sizes_unles
     let options = OpenOptions { cameras: vec![given], ..OpenOptions::default() };
     let camera = detect(&folder, messages(), &options, |_| [320, 240]).unwrap().recording.cameras[0].clone();
     assert_eq!((camera.size, lens(&camera)), (Some([320, 240]), [Some(300.0), None, None, None]));
+    let notes = detect(&folder, messages(), &options, |_| [320, 240]).unwrap().notes;
+    let said = "/left/camera_info is of 640 x 480 px, and images of camera `left` are of 320 x 240 px";
+    assert!(notes.iter().any(|note| note.starts_with(said)), "{notes:?}");
+    let notes = detect(&folder, messages(), &options, |_| [640, 480]).unwrap().notes;
+    assert!(!notes.iter().any(|note| note.contains("640 x 480")), "{notes:?}");
     let error =
         detect(&folder, messages(), &OpenOptions::default(), |second| [640, if second == 2 { 360 } else { 480 }]);
     let error = error.unwrap_err().to_string();
@@ -153,4 +163,38 @@ fn a_camera_info_that_cannot_be_read_matters_where_it_is_of_the_images() {
     assert_eq!(lens(&bag.recording.cameras[0]), RAW);
     let error = read(vec![info("/left/camera_info", "left", 2), image()]).unwrap_err().to_string();
     assert!(error.contains("/left/camera_info") && error.contains("binned or cut out"), "{error}");
+}
+
+#[test]
+fn a_lens_that_is_given_is_held_to_the_size_that_the_camera_info_says_where_no_image_is_there() {
+    let folder = Folder::new("bag-given-size");
+    let (topic, kind, text, cdr) = info("/left/camera_info", "left", 0);
+    let bytes = images_beside(2, &[(topic, kind, text, 1, cdr.bytes)]);
+    let read = |size| {
+        let lens = RecordedCamera { name: "left".into(), size, fx: Some(300.0), ..RecordedCamera::default() };
+        read_with(&bytes, &folder, &OpenOptions { cameras: vec![lens], ..OpenOptions::default() })
+    };
+    for size in [None, Some([640, 480])] {
+        let camera = read(size).unwrap().recording.cameras[0].clone();
+        assert_eq!((camera.size, lens(&camera)), (Some([640, 480]), [Some(300.0), None, None, None]));
+    }
+    let error = read(Some([320, 240])).unwrap_err().to_string();
+    assert!(error.contains("is said to be of 320 x 240 px, and its images are of 640 x 480 px"), "{error}");
+}
+
+#[test]
+fn a_distortion_model_that_is_not_known_matters_to_images_that_have_distortion() {
+    let folder = Folder::new("bag-unknown-model");
+    let read = |topic: &'static str, options: &OpenOptions| {
+        let messages = vec![info_of("/left/camera_info", "left", 0, "thin_prism"), image(topic, "left", 1)];
+        detect(&folder, messages, options, |_| [640, 480])
+    };
+    let rectified = read("/left/image_rect/compressed", &OpenOptions::default()).unwrap();
+    assert_eq!(lens(&rectified.recording.cameras[0]), RECTIFIED);
+    let error = read("/left/image_raw/compressed", &OpenOptions::default()).unwrap_err().to_string();
+    let expected = "bag.mcap: /left/camera_info has an unknown distortion model `thin_prism`; --camera left=FILE gives the intrinsics";
+    assert!(error.contains(expected), "{error}");
+    let given = RecordedCamera { name: "left".into(), fx: Some(300.0), ..RecordedCamera::default() };
+    let given = OpenOptions { cameras: vec![given], ..OpenOptions::default() };
+    assert_eq!(read("/left/image_raw/compressed", &given).unwrap().recording.cameras[0].fx, Some(300.0));
 }

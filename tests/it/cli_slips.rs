@@ -80,28 +80,80 @@ fn joints_in_another_order_than_the_rigs_are_taken_by_their_names() {
     assert!(order < rest && text.contains("as recorded it fits"), "{text}");
 }
 
+/// A recording of the UR5 as CSV: joints in degrees or radians, and pixels.
+fn csv(recording: &Recording, to_unit: fn(f64) -> f64) -> String {
+    let joints = recording.joints.iter().map(|joint| format!("joints.{joint}"));
+    let pixels = recording.samples[0].pixels.iter().flat_map(|seen| {
+        let (camera, feature) =
+            (&recording.cameras[seen.camera as usize].name, &recording.features[seen.feature as usize]);
+        ["u", "v"].map(|axis| format!("{camera}.{feature}.{axis}"))
+    });
+    let mut text = joints.chain(pixels).collect::<Vec<_>>().join(",");
+    for sample in &recording.samples {
+        let joints = sample.joints.as_ref().unwrap().iter().map(|joint| to_unit(*joint));
+        let numbers = joints.chain(sample.pixels.iter().flat_map(|seen| seen.pixel));
+        text += &format!("\n{}", numbers.map(|number| format!("{number:?}")).collect::<Vec<_>>().join(","));
+    }
+    text
+}
+
+const READERS: [&str; 6] = [
+    "calibrate FILE --rig ur5 -o x.toml",
+    "check ur5 FILE",
+    "evaluate ur5 FILE",
+    "infer ur5 FILE",
+    "monitor ur5 FILE",
+    "suggest x.toml --count 1 --rig ur5 --with FILE",
+];
+
 #[test]
 fn every_command_that_reads_recordings_takes_the_options_of_reading() {
     let folder = Folder::new("slips-reading");
-    folder.expect(0, "simulate ur5 --samples 3 -o rec.jsonl");
-    for command in [
-        "calibrate rec.jsonl -o x.toml",
-        "check ur5 rec.jsonl",
-        "evaluate ur5 rec.jsonl",
-        "monitor ur5 rec.jsonl",
-        "suggest ur5 --with rec.jsonl",
-    ] {
-        let (_, err) = folder.expect(2, &format!("{command} --joint-topic /left/joint_states"));
+    folder.expect(0, "simulate ur5 --samples 8 --in-view 1 --seed 4 -o rec.jsonl");
+    folder.expect(0, "calibrate rec.jsonl --rig ur5 -o x.toml");
+    for command in READERS {
+        let (_, err) =
+            folder.expect(2, &format!("{} --joint-topic /left/joint_states", command.replace("FILE", "rec.jsonl")));
         assert_eq!(err, "error: rec.jsonl is a recording, where --joint-topic has no effect\n", "{command}");
     }
-    // What they say is heeded.
-    folder.write("one.toml", "[[robot.joints]]\nname = \"a\"\noffset = 0\nd = 0.1\na = 0.3\nalpha = 0\n");
-    folder.write("table.csv", "time,joints.a,left.f0.u,left.f0.v\n0,5,10,20\n1,6,12,20\n");
-    let largest = |options: &str| {
-        let (json, _) = folder.expect(0, &format!("check one.toml table.csv --camera left=640x480 --json {options}"));
+    // What they say is heeded: in degrees as they are said to be, the numbers are those of the recording in radians.
+    let recording = Recording::read(&folder.path().join("rec.jsonl")).unwrap();
+    folder
+        .write("radians.csv", &csv(&recording, |joint| joint))
+        .write("degrees.csv", &csv(&recording, f64::to_degrees));
+    let sizes = recording.cameras.iter().map(|camera| {
+        let [width, height] = camera.size.unwrap();
+        format!("--camera {}={width}x{height}", camera.name)
+    });
+    let sizes = sizes.collect::<Vec<_>>().join(" ");
+    let maximum = |file: &str, option: &str| {
+        let (json, _) = folder.expect(0, &format!("check ur5 {file} {sizes} {option} --json"));
         let json: serde_json::Value = serde_json::from_str(&json).unwrap();
-        json["recording"]["joints"]["a"]["max"].as_f64().unwrap()
+        json["recording"]["joints"]["elbow"]["max"].as_f64().unwrap()
     };
-    assert!((largest("") - 6.0).abs() < 1e-12);
-    assert!((largest("--degrees") - 6_f64.to_radians()).abs() < 1e-12);
+    assert!((maximum("radians.csv", "--radians") - maximum("degrees.csv", "--degrees")).abs() < 1e-12);
+    for command in READERS.iter().filter(|command| !command.starts_with("check")) {
+        let (_, err) = folder.expect(2, &format!("{} --degrees=no_joint", command.replace("FILE", "degrees.csv")));
+        assert!(err.contains("degrees.csv: there is no joint `no_joint` to take for degrees"), "{command}: {err}");
+        folder.expect(0, &format!("{} {sizes} --degrees", command.replace("FILE", "degrees.csv")));
+    }
+}
+
+#[test]
+fn options_of_reading_are_refused_where_nothing_is_read() {
+    let folder = Folder::new("slips-nothing-read");
+    for command in ["check ur5", "suggest ur5"] {
+        for option in [
+            "--camera left=8x6",
+            "--joints a",
+            "--join 0.1",
+            "--degrees",
+            "--actions targets",
+            "--joint-topic /joint_states",
+        ] {
+            let (_, err) = folder.expect(2, &format!("{command} {option}"));
+            let name = option.split(' ').next().unwrap();
+            assert_eq!(err, format!("error: no recording is read, where {name} has no effect\n"), "{command}");
+        }
+    }
 }

@@ -250,3 +250,47 @@ fn a_size_for_a_camera_leaves_what_is_known_of_its_images() {
     let (_, error) = folder.expect(2, &format!("detect shots --pattern {pattern} --camera hand=8x6 -o out.jsonl"));
     assert!(error.contains("said to be of 8 x 6 px, and its images are of 320 x 240 px"), "{error}");
 }
+
+#[test]
+fn what_was_commanded_stays_where_it_leads_to_the_next_image_and_what_is_lost_is_told() {
+    let folder = Folder::new("detect-actions");
+    let rows = TAG36H11[0].1;
+    std::fs::create_dir_all(folder.path().join("left")).unwrap();
+    for (index, name) in ["10", "11", "13"].into_iter().enumerate() {
+        let mut rng = ChaCha8Rng::seed_from_u64(index as u64);
+        let image =
+            View::random(&mut rng, [0.1; 2], 0.5).render(|x, y| is_dark(&rows, 10.0 * x, 10.0 * y), 0.8, 2.0, &mut rng);
+        std::fs::write(folder.path().join(format!("left/{name}.png")), png(&image)).unwrap();
+    }
+    let pose = "pose.x,pose.y,pose.z,pose.qx,pose.qy,pose.qz,pose.qw";
+    folder.write(
+        "rows.csv",
+        &format!(
+            "time,image,joints.a,joint_action.a,{pose}\n10,10.png,1,0.5,0,0,0,0,0,0,1\n11,11.png,2,0.25,1,0,0,0,0,0,1\n12,12.png,3,0.5,2,0,0,0,0,0,1\n\
+             13,13.png,,,3,0,0,0,0,0,1\n"
+        ),
+    );
+    for how in ["name", "time"] {
+        let (said, _) =
+            folder.expect(0, &format!("detect left --pattern tag36h11 --states rows.csv --pair {how} -o {how}.jsonl"));
+        let samples = Recording::read(&folder.path().join(format!("{how}.jsonl"))).unwrap().samples;
+        let actions: Vec<_> = samples.iter().map(|sample| sample.joint_action.clone()).collect();
+        // From 11 it leads to 12, of which there is no image.
+        assert_eq!(actions, [Some(vec![0.5]), None, None], "{how}");
+        assert!(said.contains("2 of 3 commanded motions are left out: they lead from one row to the next"), "{said}");
+        let joints: Vec<_> = samples.iter().map(|sample| sample.joints.clone()).collect();
+        assert_eq!(joints, [Some(vec![1.0]), Some(vec![2.0]), None], "{how}");
+        assert!(samples.iter().all(|sample| sample.pose.is_some()), "{how}");
+        let missing = "1 of 3 samples have a tip pose and no joints, which were read from 10 s to 12 s";
+        assert_eq!(said.contains(missing), how == "time", "{said}");
+    }
+    // A bag's states belong to its own images.
+    folder.write("bag.mcap", "");
+    let (_, error) = folder.expect(2, "detect left --pattern tag36h11 --states bag.mcap -o out.jsonl");
+    assert!(
+        error.starts_with("error: --states bag.mcap: a bag says where the robot was at the stamps of its own images"),
+        "{error}"
+    );
+    let (_, error) = folder.expect(2, "detect left bag.mcap --pattern tag36h11 -o out.jsonl");
+    assert!(error.starts_with("error: bag.mcap: a bag is looked at alone"), "{error}");
+}

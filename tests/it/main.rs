@@ -1,6 +1,7 @@
 //! What users are promised, one file per promise.
 mod bag;
 mod bag_cameras;
+mod bag_joints;
 mod bag_kinds;
 mod calibration;
 mod cli;

@@ -1,4 +1,5 @@
 //! A recording read back is the recording written; several join into one.
+use crate::cli::Folder;
 use crate::rig_files::{random_number, random_pose};
 use handeye::Error;
 use handeye::camera::CameraModel;
@@ -144,27 +145,8 @@ fn a_recording_is_read_as_a_stream_with_the_line_of_every_sample() {
     assert!(broken.next().is_none(), "nothing follows an error");
 }
 
-/// Files in a folder of their own, which goes with them.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let folder = std::env::temp_dir().join(format!("handeye-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
-        Folder(folder)
-    }
-
-    fn file(&self, name: &str, text: &str) -> PathBuf {
-        let path = self.0.join(name);
-        std::fs::write(&path, text).unwrap();
-        path
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        std::fs::remove_dir_all(&self.0).unwrap();
-    }
+fn file(folder: &Folder, name: &str, text: &str) -> PathBuf {
+    folder.write(name, text).path().join(name)
 }
 
 fn header(joints: &str, cameras: &str) -> String {
@@ -181,7 +163,7 @@ fn several_recordings_join_and_no_command_leads_from_one_into_the_next() {
     let second = header(r#"["j"]"#, r#"{"right":{"fx":600},"left":{"fx":500,"size":[640,480]}}"#)
         + &sample("left", "f2")
         + &sample("right", "f10");
-    let joined = Recording::read_all(&[folder.file("1.jsonl", &first), folder.file("2.jsonl", &second)]).unwrap();
+    let joined = Recording::read_all(&[file(&folder, "1.jsonl", &first), file(&folder, "2.jsonl", &second)]).unwrap();
     assert_eq!(joined.cameras.iter().map(|camera| camera.name.as_str()).collect::<Vec<_>>(), ["left", "right"]);
     assert_eq!((joined.cameras[0].fx, joined.cameras[0].size), (Some(500.0), Some([640, 480])));
     assert_eq!(joined.features, ["f2", "f10"]);
@@ -194,9 +176,10 @@ fn several_recordings_join_and_no_command_leads_from_one_into_the_next() {
 #[test]
 fn recordings_of_different_rigs_do_not_join_and_both_files_are_named() {
     let folder = Folder::new("mismatch");
-    let base = folder.file("base.jsonl", &(header(r#"["a","b"]"#, r#"{"left":{"size":[640,480],"fx":600}}"#) + "{}\n"));
-    let other_joints = folder.file("joints.jsonl", &(header(r#"["b","a"]"#, "{}") + "{}\n"));
-    let other_camera = folder.file("camera.jsonl", &(header(r#"["a","b"]"#, r#"{"left":{"fx":601}}"#) + "{}\n"));
+    let base =
+        file(&folder, "base.jsonl", &(header(r#"["a","b"]"#, r#"{"left":{"size":[640,480],"fx":600}}"#) + "{}\n"));
+    let other_joints = file(&folder, "joints.jsonl", &(header(r#"["b","a"]"#, "{}") + "{}\n"));
+    let other_camera = file(&folder, "camera.jsonl", &(header(r#"["a","b"]"#, r#"{"left":{"fx":601}}"#) + "{}\n"));
     for (other, words) in
         [(other_joints, "different robots"), (other_camera, "disagree about camera `left`: `fx` is 600.0 and 601.0")]
     {
@@ -213,7 +196,7 @@ fn recordings_of_different_rigs_do_not_join_and_both_files_are_named() {
 #[test]
 fn what_cannot_be_read_back_is_not_written() {
     let folder = Folder::new("not-finite");
-    let path = folder.file("recording.jsonl", "old");
+    let path = file(&folder, "recording.jsonl", "old");
     let mut recording = random_recording(1);
     recording.samples[0].time = Some(f64::NAN);
     assert!(matches!(recording.write(&path), Err(Error::Io { .. })));
@@ -221,4 +204,55 @@ fn what_cannot_be_read_back_is_not_written() {
     recording.samples[0].time = Some(0.5);
     recording.write(&path).unwrap();
     assert_same(&Recording::read(&path).unwrap(), &recording, "on disk");
+}
+
+#[test]
+fn what_is_known_of_a_camera_is_said_of_every_file_that_has_it_and_a_camera_that_none_has_is_refused() {
+    let folder = Folder::new("files-cameras");
+    for (file, cameras) in [("left", &["left"][..]), ("right", &["right"]), ("both", &["left", "right"])] {
+        let seen: Vec<String> = cameras.iter().map(|camera| format!("\"{camera}\":{{\"f0\":[1,2]}}")).collect();
+        let headers: Vec<String> = cameras.iter().map(|camera| format!("\"{camera}\":{{}}")).collect();
+        let header = format!("\"format\":\"handeye-recording\",\"version\":1,\"cameras\":{{{}}}", headers.join(","));
+        folder.write(&format!("{file}.jsonl"), &format!("{{{header}}}\n{{\"pixels\":{{{}}}}}\n", seen.join(",")));
+    }
+    let paths = ["left", "right", "both"].map(|file| folder.path().join(format!("{file}.jsonl")));
+    let known = |name: &str| OpenOptions {
+        cameras: vec![RecordedCamera {
+            name: name.into(),
+            size: Some([640, 480]),
+            fx: Some(500.0),
+            ..Default::default()
+        }],
+        ..OpenOptions::default()
+    };
+    let cameras = Recording::open_all(&paths, &known("right")).unwrap().recording.cameras;
+    let found: Vec<_> = cameras.iter().map(|camera| (camera.name.as_str(), camera.size, camera.fx)).collect();
+    assert_eq!(found, [("left", None, None), ("right", Some([640, 480]), Some(500.0))]);
+    let error = Recording::open_all(&paths, &known("rihgt")).unwrap_err().to_string();
+    assert!(error.ends_with("both.jsonl: there are no images of a camera `rihgt` (did you mean `right`?)"), "{error}");
+    let (_, error) = folder.expect(2, "calibrate left.jsonl right.jsonl --camera top=640x480 -o x.toml");
+    let expected = "error: left.jsonl, right.jsonl: there are no images of a camera `top`";
+    assert!(error.starts_with(expected), "{error}");
+    // Two files may not have two sizes of it.
+    folder.write(
+        "small.jsonl",
+        &folder.read("right.jsonl").replace("{\"right\":{}}", "{\"right\":{\"size\":[320,240]}}"),
+    );
+    let (_, error) = folder.expect(2, "calibrate left.jsonl small.jsonl --camera right=640x480 -o x.toml");
+    assert!(error.starts_with("error: small.jsonl: camera `right` is said to be of 640 x 480 px"), "{error}");
+}
+
+#[test]
+fn joints_that_the_rig_does_not_have_are_left_out_of_a_recording_by_their_names_and_told() {
+    let folder = Folder::new("files-joints");
+    let text = "{\"format\":\"handeye-recording\",\"version\":1,\"joints\":[\"finger\",\"b\",\"a\"],\"cameras\":{}}\n\
+        {\"joints\":[7,2,1],\"joint_action\":[70,20,10]}\n{\"joints\":[8,3,2]}\n";
+    folder.write("rec.jsonl", text);
+    let known_joints = vec!["a".to_owned(), "b".to_owned()];
+    let options = OpenOptions { known_joints, ..OpenOptions::default() };
+    let Opened { recording, notes, .. } = Recording::open_with(&folder.path().join("rec.jsonl"), &options).unwrap();
+    assert_eq!((&recording.joints, &recording.samples[0].joints), (&options.known_joints, &Some(vec![1.0, 2.0])));
+    assert_eq!(recording.samples[0].joint_action, Some(vec![10.0, 20.0]));
+    let left_out = "joints that are left out: finger; those that are taken: a, b";
+    assert!(notes.len() == 2 && notes[1] == left_out, "{notes:?}");
 }

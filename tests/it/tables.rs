@@ -181,6 +181,10 @@ fn mistakes_in_a_table_are_named_with_line_and_column() {
         ("time,left.f.w\n0,1\n", "table.csv:1:6: nothing is known of a coordinate `w`"),
         ("time,pose.x,pose.y,pose.z\n0,1,2,3\n", "table.csv:1:6: there is `pose.x`, and no `pose.qx`"),
         (
+            "episode_index,joints.a\n0,1\n,2\n1,3\n",
+            "table.csv:3:1: this is empty in some rows only: each row has to say its episode, or none",
+        ),
+        (
             "pose.x,pose.y,pose.z,pose.qx,pose.qy,pose.qz,pose.qw\n0,0,0,0,0,0,0\n",
             "table.csv:2:7: a quaternion of length 0",
         ),
@@ -251,4 +255,103 @@ fn a_table_is_held_to_what_a_recording_file_is_held_to() {
     let mut text = Vec::new();
     recording.write_to(&mut text).unwrap();
     assert_eq!(Recording::read_from(&text[..], "text").unwrap(), recording);
+}
+
+#[test]
+fn a_clock_that_counts_since_its_start_is_no_date() {
+    let folder = Folder::new("tables-boot");
+    // 20 minutes in nanoseconds and in microseconds, 30 times a second: as dates they would be hours apart.
+    for (start, step) in [(1_200_000_000_000_u64, 33_000_000), (1_200_000_000, 33_000)] {
+        let rows = |name: &str| -> String {
+            let row = |k: u64| format!("{},0.{k}\n", start + step * k);
+            format!("{name},joints.a\n{}", (0..5).map(row).collect::<String>())
+        };
+        let unit = if step > 1_000_000 { ("time_ns", 1e9) } else { ("time_us", 1e6) };
+        let said = csv(&folder, &rows(unit.0), &OpenOptions::default()).unwrap();
+        let times: Vec<f64> = said.recording.samples.iter().map(|sample| sample.time.unwrap()).collect();
+        assert!((times[4] - times[0] - 4.0 * step as f64 / unit.1).abs() < 1e-9, "{times:?}");
+        match csv(&folder, &rows("time"), &OpenOptions::default()) {
+            Err(error) => {
+                assert!(error.to_string().contains("a clock that counts since its start needs a column"), "{error}")
+            }
+            // Seconds are what is taken where nothing says otherwise.
+            Ok(opened) => {
+                assert!(
+                    step < 1_000_000 && opened.notes.iter().any(|note| note.contains("33000 s apart")),
+                    "{opened:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn an_empty_column_of_episodes_says_nothing() {
+    let folder = Folder::new("tables-no-episode");
+    let text = "time,episode_index,joints.a,joint_action.a\n0,,1,0.5\n1,,2,0.5\n2,,3,0.5\n";
+    let found = csv(&folder, text, &OpenOptions::default()).unwrap().recording;
+    let actions: Vec<_> = found.samples.iter().map(|sample| sample.joint_action.clone()).collect();
+    assert_eq!(actions, [Some(vec![0.5]), Some(vec![0.5]), None]);
+    // Nor may time go back, as it may from one episode to the next.
+    let back = csv(&folder, &text.replace("\n2,", "\n0.5,"), &OpenOptions::default()).unwrap_err().to_string();
+    assert!(back.contains("table.csv:4:1: time goes back"), "{back}");
+    let one = of_table(TableOptions { episodes: vec![1], ..TableOptions::default() });
+    let error = csv(&folder, text, &one).unwrap_err().to_string();
+    assert!(error.ends_with("has no episode 1; it has none"), "{error}");
+}
+
+#[test]
+fn joints_with_points_in_their_names_are_called_as_in_a_dataset_of_lerobot() {
+    let folder = Folder::new("tables-points");
+    let text = "time,joints.shoulder_pan.pos,joints.arm.lift_deg,joint_action.shoulder_pan.pos,joint_action.arm.lift\n0,0.5,90,1,2\n1,1,0,1,2\n";
+    let plain = "time,shoulder_pan.pos,arm.lift_deg\n0,0.5,90\n1,1,0\n";
+    let names = |names: [&str; 2]| names.map(str::to_owned).to_vec();
+    for (text, options) in [
+        (text, OpenOptions::default()),
+        (text, OpenOptions { joints: names(["shoulder_pan.pos", "arm.lift"]), ..OpenOptions::default() }),
+        (plain, OpenOptions { joints: names(["shoulder_pan.pos", "arm.lift"]), ..OpenOptions::default() }),
+        (plain, OpenOptions { known_joints: names(["shoulder_pan", "arm_lift"]), ..OpenOptions::default() }),
+    ] {
+        let found = csv(&folder, text, &options).unwrap().recording;
+        assert_eq!(found.joints, ["shoulder_pan", "arm_lift"], "{text}");
+        assert_eq!(found.samples[0].joints, Some(vec![0.5, PI / 2.0]), "{text}");
+    }
+    let first = csv(&folder, text, &OpenOptions::default()).unwrap().recording.samples[0].clone();
+    assert_eq!(first.joint_action, Some(vec![1.0, 2.0]));
+    let degrees = Angles::Degrees(vec!["shoulder_pan.pos".to_owned()]);
+    let read = csv(&folder, text, &of_table(TableOptions { angles: degrees, ..TableOptions::default() })).unwrap();
+    assert_eq!(read.recording.samples[0].joints, Some(vec![0.5 * (PI / 180.0), PI / 2.0]));
+}
+
+#[test]
+fn joints_that_are_not_taken_are_told_and_options_without_effect_refused() {
+    let folder = Folder::new("tables-effects");
+    let text = "time,joints.finger,joints.a\n0,7,0.5\n1,7,1\n";
+    let options = OpenOptions { known_joints: vec!["a".to_owned()], ..OpenOptions::default() };
+    let Opened { recording, notes, .. } = csv(&folder, text, &options).unwrap();
+    assert_eq!((&recording.joints, &recording.samples[0].joints), (&options.known_joints, &Some(vec![0.5])));
+    let told = notes.iter().filter(|note| note.contains("finger")).collect::<Vec<_>>();
+    assert_eq!(told, ["joints that are left out: finger; those that are taken: a"]);
+
+    let seen = "left.f.u,left.f.v\n1,2\n";
+    for (text, options, says) in [
+        (
+            text,
+            "--actions targets",
+            "has no columns `action.NAME` (nor LeRobot's `action`), of which --actions would say",
+        ),
+        (
+            "joints.a,joint_action.a,action.a\n0,1,1\n",
+            "--actions motions",
+            "has commanded motions in `joint_action.NAME`, beside which --actions has no effect",
+        ),
+        ("action.a,left.f.u,left.f.v\n1,1,2\n", "--actions targets", "has no columns `joints.NAME`, from which"),
+        (seen, "--degrees", "has no joints, which --degrees would take for degrees"),
+        (seen, "--radians", "has no joints but in columns that say `_deg`, where --radians has no effect"),
+        ("joints.a_deg\n90\n", "--radians", "has no joints but in columns that say `_deg`"),
+    ] {
+        folder.write("table.csv", text);
+        let (_, error) = folder.expect(2, &format!("convert table.csv {options} -o out.jsonl"));
+        assert!(error.starts_with(&format!("error: table.csv: {says}")), "{text} {options}: {error}");
+    }
 }

@@ -1,5 +1,6 @@
-//! The first pass over a bag: what images show, and what is said of cameras.
+//! The first pass over a bag: what images show, what is said of cameras, and which joints there are.
 use super::cameras::Info;
+use super::joints::JointLists;
 use super::kinds::{Kind, features, frame, need, stamp};
 use super::labels::Labels;
 use super::messages::{Channel, Visitor};
@@ -38,6 +39,7 @@ pub(super) struct Images<'a> {
     /// The size of each source's images, where they were looked at.
     pub sizes: BTreeMap<usize, [u32; 2]>,
     pub infos: BTreeMap<Source, Said>,
+    pub joints: JointLists,
     /// Of the last image, whose memory the next one takes.
     seen: Vec<(u32, [f64; 2])>,
     /// Pixels that are no numbers.
@@ -60,6 +62,7 @@ impl<'a> Images<'a> {
             sources: Vec::new(),
             sizes: BTreeMap::new(),
             infos: BTreeMap::new(),
+            joints: JointLists::default(),
             seen: Vec::new(),
             not_finite: 0,
             detect,
@@ -160,6 +163,12 @@ impl Visitor for Images<'_> {
                 })?;
                 // As long as it is, and no longer.
                 self.images.push(Image { stamp, source, features: seen.as_slice().to_vec() });
+            }
+            Some(Kind::JointStates) => {
+                let _ = topic.decode(self.path, time, data, |state| {
+                    self.joints.add(&topic.name, state);
+                    Ok(())
+                });
             }
             Some(Kind::CameraInfo) => {
                 // It is said again with every image.

@@ -6,6 +6,7 @@ mod cameras;
 mod folder;
 mod frames;
 mod images;
+mod joints;
 mod kinds;
 mod labels;
 mod messages;
@@ -15,7 +16,7 @@ mod topics;
 mod value;
 
 use super::groups::{Group, groups, samples};
-use super::names::tidy;
+use super::order::note_on_others;
 use super::track::At;
 use super::{OpenOptions, Opened, Recording};
 use crate::Error;
@@ -63,7 +64,7 @@ impl Recording {
         options: &'a OpenOptions,
         detect: &'a mut Detect<'a>,
     ) -> Result<Opened, Error> {
-        read(path, options, Some(detect))
+        read(path, options, Some(detect))?.with_cameras(&path.display().to_string(), options)
     }
 }
 
@@ -85,41 +86,57 @@ pub(super) fn read<'a>(
         Some(_) => "compressed image (sensor_msgs/CompressedImage) that shows what is looked for",
         None => "image with features (apriltag_msgs/AprilTagDetectionArray or vision_msgs/Detection2DArray)",
     };
+    let is_of_messages = detect.is_none();
     let mut images = Images::new(path, of_bag, detect);
     let files = folder::files(path)?;
     let problems = messages::visit(&files, &mut images)?;
     let mut notes: Vec<String> = problems.into_iter().chain(images.finish()?).collect();
-    let (cameras, camera_of_source) = cameras::cameras(path, &mut images, options)?;
+    let mut of_cameras = Vec::new();
+    let (cameras, camera_of_source) = cameras::cameras(path, &mut images, options, &mut of_cameras)?;
     let within = of_bag.join.map(|seconds| (seconds * 1e9) as i64);
     let groups = groups(&images.images, &camera_of_source, within);
     if groups.is_empty() {
         let cut_off = notes.first().map_or_else(String::new, |note| format!(", and it {note}"));
+        let on_topics = if of_bag.camera_topics.is_empty() { "" } else { " on the topics of --camera-topic" };
+        let has_images = images.topics.iter().any(|topic| topic.kind == Some(Kind::CompressedImage));
+        let would_do = if is_of_messages && has_images { "; `handeye detect` looks at compressed images" } else { "" };
+        let there = topics::list(&images.topics);
         return Err(Error::Unusable(format!(
-            "{}: has no {wanted}{}; it has {}{cut_off}",
+            "{}: has no {wanted}{on_topics}; it has {there}{cut_off}{would_do}",
             path.display(),
-            if of_bag.camera_topics.is_empty() { "" } else { ", on the topics that were named" },
-            topics::list(&images.topics)
         )));
     }
     let topics = &images.topics;
-    let joint_topic = choose(topics, Kind::JointStates, of_bag.joint_topic.as_deref(), "--joint-topic", path)?;
+    let unusable = |problem: String| Error::Unusable(format!("{}: {problem}", path.display()));
+    let joint_topic = match (&of_bag.joint_topic, images.joints.topic(options)) {
+        (None, Some(topic)) => Some(topic),
+        (named, _) => choose(topics, Kind::JointStates, named.as_deref(), "--joint-topic", path)?,
+    };
+    let joint_names = match joint_topic {
+        Some(topic) => {
+            images.joints.order(topic, options).map_err(|problem| unusable(format!("{topic}: {problem}")))?
+        }
+        None => Vec::new(),
+    };
     let pose_topic = match &of_bag.pose_topic {
         None if joint_topic.is_some() || of_bag.frames.is_some() => None,
         named => choose(topics, Kind::Pose, named.as_deref(), "--pose-topic", path)?,
     };
     let moments: Vec<i64> = groups.iter().map(|group| group.time).collect();
-    let mut states = States::new(path, options, &moments, [joint_topic, pose_topic]);
+    let mut states = States::new(path, options, &moments, [joint_topic, pose_topic], &joint_names);
     if joint_topic.is_some() || pose_topic.is_some() || of_bag.frames.is_some() {
         messages::visit(&files, &mut states)?;
     }
     let poses = match &of_bag.frames {
-        Some([base, tip]) => states
-            .frames
-            .poses(&moments, base.trim_start_matches('/'), tip.trim_start_matches('/'))
-            .map_err(|problem| Error::Unusable(format!("{}: {problem}", path.display())))?,
+        Some([base, tip]) => {
+            states.frames.poses(&moments, base.trim_start_matches('/'), tip.trim_start_matches('/')).map_err(
+                |problem| unusable(format!("{problem}; --base-frame and --tip-frame name two that hang together")),
+            )?
+        }
         None => states.poses.at(&moments),
     };
     let joints = states.joints.at(&moments);
+    notes.append(&mut of_cameras);
     notes.extend(note_on_groups(&groups));
     if joint_topic.is_some() {
         notes.extend(note_on_states("joint states", &joints, states.joints.span(), &moments));
@@ -135,12 +152,11 @@ pub(super) fn read<'a>(
             notes.push(format!("{number} {what}"));
         }
     }
-    let names = std::mem::take(&mut states.names);
-    if options.joints.is_empty() && !names.is_empty() && names != options.known_joints {
-        let order = names.join(", ");
+    notes.extend(note_on_others(images.joints.all(), &joint_names));
+    if options.joints.is_empty() && !joint_names.is_empty() && joint_names != options.known_joints {
+        let order = joint_names.join(", ");
         notes.push(format!(
-                "joints are in the order of the first joint state: {order}; where that is not from base to tip, give a rig with these names or \
-                 `handeye convert --joints`"
+                "joints are in the order of the first joint state: {order}; where that is not from base to tip, give a rig with these names or --joints"
             ));
     }
     let states = joints.into_iter().zip(poses);
@@ -149,10 +165,9 @@ pub(super) fn read<'a>(
     if twice > 0 {
         notes.push(format!("{twice} detections are of a feature that the same image has already, and are left out"));
     }
-    let joints = names.iter().map(|name| tidy(name)).collect();
-    let mut recording = Recording { joints, cameras, features, samples };
+    let mut recording = Recording { joints: joint_names, cameras, features, samples };
     let file = path.display().to_string();
-    let described = recording.describe_cameras(&options.cameras);
+    let described = recording.describe_those_there(&options.cameras);
     described.map_err(|problem| Error::Unusable(format!("{file}: {problem}")))?;
     Ok(Opened { recording: recording.checked_as(&file)?, notes, images: Vec::new() })
 }

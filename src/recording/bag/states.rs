@@ -6,6 +6,7 @@ use super::topics::Topic;
 use super::value::Texts;
 use crate::Error;
 use crate::recording::OpenOptions;
+use crate::recording::names::joint_name;
 use crate::recording::track::Track;
 use handeye_solvers::Pose;
 use std::path::Path;
@@ -20,8 +21,8 @@ pub(super) struct States<'a> {
     /// Topics of joint states and of tip poses.
     joint_topic: Option<&'a str>,
     pose_topic: Option<&'a str>,
-    /// Names of the joints, from base to tip; empty before the first state.
-    pub names: Vec<String>,
+    /// Names of the joints, from base to tip.
+    joint_names: &'a [String],
     /// The names of the last state as they stand in it, and the place of each joint among them, where it has all.
     last: Option<(Vec<u8>, Option<Vec<usize>>)>,
     /// The joints of the last state, whose memory the next one takes.
@@ -39,6 +40,7 @@ impl<'a> States<'a> {
         options: &'a OpenOptions,
         moments: &'a [i64],
         from: [Option<&'a str>; 2],
+        joint_names: &'a [String],
     ) -> Self {
         States {
             path,
@@ -47,7 +49,7 @@ impl<'a> States<'a> {
             topics: Vec::new(),
             joint_topic: from[0],
             pose_topic: from[1],
-            names: Vec::new(),
+            joint_names,
             last: None,
             state: Vec::new(),
             joints: Track::new(moments.len()),
@@ -59,14 +61,9 @@ impl<'a> States<'a> {
 
     /// Reads the joints of a state, and says whether it has all of them.
     fn read(&mut self, names: Texts, positions: &[f64]) -> Result<bool, String> {
-        // A first state without positions names no joints, and the next one may.
-        let is_last = !self.names.is_empty() && self.last.as_ref().is_some_and(|(last, _)| last == names.bytes);
-        if !is_last {
-            let texts = names.to_vec()?;
-            if self.names.is_empty() {
-                self.names = self.order(&texts, positions.len())?;
-            }
-            let places = self.names.iter().map(|joint| texts.iter().position(|name| name == joint)).collect();
+        if self.last.as_ref().is_none_or(|(last, _)| last != names.bytes) {
+            let found: Vec<String> = names.to_vec()?.iter().map(|name| joint_name(name)).collect();
+            let places = self.joint_names.iter().map(|joint| found.iter().position(|name| name == joint)).collect();
             self.last = Some((names.bytes.to_vec(), places));
         }
         let places = self.last.as_ref().and_then(|(_, places)| places.as_ref());
@@ -74,22 +71,6 @@ impl<'a> States<'a> {
         self.state.clear();
         self.state.extend(places.iter().filter_map(|place| positions.get(*place)).filter(|joint| joint.is_finite()));
         Ok(self.state.len() == places.len())
-    }
-
-    /// The joints from base to tip: as given, as in the rig where the first state has all of those, or else as in that state.
-    fn order(&self, names: &[String], positions: usize) -> Result<Vec<String>, String> {
-        let OpenOptions { joints, known_joints, .. } = self.options;
-        if let Some(missing) = joints.iter().find(|joint| !names.contains(joint)) {
-            let there = names.join(", ");
-            return Err(format!("has no joint `{missing}`; it has {there}"));
-        }
-        let is_known = !known_joints.is_empty() && known_joints.iter().all(|joint| names.contains(joint));
-        Ok(match (joints.is_empty(), is_known) {
-            (false, _) => joints.clone(),
-            (true, true) => known_joints.clone(),
-            // A state without positions says nothing of joints.
-            (true, false) => names.iter().take(positions).cloned().collect(),
-        })
     }
 }
 

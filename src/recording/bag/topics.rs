@@ -100,7 +100,7 @@ pub(super) fn choose<'a>(
         Some(named) => match names.iter().find(|name| is_topic(name, named)) {
             Some(name) => Ok(Some(name)),
             None => Err(Error::Unusable(format!(
-                "{file}: has no messages for {option} on `{named}`; it has {}",
+                "{file}: {option} names `{named}`, on which there are no such messages; there are {}",
                 list(topics)
             ))),
         },
@@ -108,7 +108,7 @@ pub(super) fn choose<'a>(
             [] => Ok(None),
             [name] => Ok(Some(name)),
             _ => Err(Error::Unusable(format!(
-                "{file}: {option} of `handeye convert` has to name one of {}",
+                "{file}: there are several topics of a kind, and {option} has to name one of {}",
                 names.join(", ")
             ))),
         },

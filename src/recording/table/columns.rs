@@ -3,7 +3,7 @@ use super::Actions;
 use crate::error::suggestion;
 use crate::recording::OpenOptions;
 use crate::recording::clock::UNITS;
-use crate::recording::names::{Names, natural_order, tidy};
+use crate::recording::names::{Names, joint_name, natural_order};
 use crate::rig::{problem_of_joint_name, problem_of_name};
 use std::collections::BTreeMap;
 
@@ -14,6 +14,8 @@ pub(super) struct Columns {
     pub episode: Option<usize>,
     /// Names of the joints, from base to tip.
     pub joint_names: Vec<String>,
+    /// Names in `joints.NAME`.
+    pub named_joints: Vec<String>,
     /// One per joint, or none at all.
     pub joints: Vec<Angle>,
     pub joint_action: Vec<Angle>,
@@ -112,12 +114,20 @@ impl Columns {
                 columns.time = Some(Time { column: index, unit });
                 continue;
             }
+            // A joint's name may have points itself: `joints.shoulder_pan.pos`.
+            let group = match name.split_once('.') {
+                Some(("joints" | "joint", joint)) => Some((&mut named_joints, joint)),
+                Some(("joint_action", joint)) => Some((&mut joint_action, joint)),
+                Some(("action", joint)) => Some((&mut action, joint)),
+                _ => None,
+            };
+            if let Some((group, joint)) = group {
+                group.add(index, joint)?;
+                continue;
+            }
             match name.split('.').collect::<Vec<_>>()[..] {
                 ["episode_index"] => columns.episode = Some(index),
                 [name] if COUNTERS.contains(&name) || IMAGES.contains(&name) => {}
-                ["joints" | "joint", joint] => named_joints.add(index, joint)?,
-                ["joint_action", joint] => joint_action.add(index, joint)?,
-                ["action", joint] => action.add(index, joint)?,
                 [pose @ ("pose" | "pose_action"), part] => poses.entry(pose).or_default().add(index, part)?,
                 [first, ..] if FOREIGN.contains(&first) => columns.others.push(name.to_owned()),
                 [camera, feature, part] => {
@@ -174,12 +184,12 @@ impl Columns {
     ) -> Result<(), Problem> {
         let find = |joint: &String| {
             let plain = || {
-                let at = |name: String| header.iter().position(|column| *column == name);
-                let in_degrees = at(format!("{joint}_deg"));
-                let column = at(joint.clone()).or(in_degrees)?;
+                let at = |name: &str| header.iter().position(|column| joint_name(column) == joint_name(name));
+                let in_degrees = at(&format!("{joint}_deg"));
+                let column = at(joint).or(in_degrees)?;
                 Some(Angle { column, in_degrees: in_degrees == Some(column) })
             };
-            named.find(joint).or_else(plain)
+            named.find(&joint_name(joint)).or_else(plain)
         };
         let all = |joints: &[String]| joints.iter().map(find).collect::<Option<Vec<Angle>>>();
         if let Some(missing) = joints.iter().find(|joint| find(joint).is_none()) {
@@ -194,7 +204,8 @@ impl Columns {
         self.joints = all(&names).unwrap_or_default();
         self.others.retain(|other| !self.joints.iter().any(|joint| header[joint.column] == *other));
         // A column may be asked for by a name that no parameter path can hold.
-        self.joint_names = names.iter().map(|name| tidy(name)).collect();
+        self.joint_names = names.iter().map(|name| joint_name(name)).collect();
+        self.named_joints = named.0.iter().map(|(name, _)| name.clone()).collect();
         for (name, joint) in self.joint_names.iter().zip(&self.joints) {
             if let Some(problem) = problem_of_joint_name(name) {
                 return Err((joint.column, problem));
@@ -243,13 +254,14 @@ struct Group(Vec<(String, Angle)>);
 impl Group {
     fn add(&mut self, column: usize, name: &str) -> Result<(), Problem> {
         let (name, in_degrees) = name.strip_suffix("_deg").map_or((name, false), |name| (name, true));
-        if let Some(problem) = problem_of_joint_name(name) {
+        let name = if name.is_empty() { String::new() } else { joint_name(name) };
+        if let Some(problem) = problem_of_joint_name(&name) {
             return Err((column, problem));
         }
-        if self.find(name).is_some() {
+        if self.find(&name).is_some() {
             return Err((column, format!("joint `{name}` has two columns")));
         }
-        self.0.push((name.to_owned(), Angle { column, in_degrees }));
+        self.0.push((name, Angle { column, in_degrees }));
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 //! What a LeRobot dataset says beside its numbers: names of joints, sizes of images.
 use crate::Error;
 use crate::recording::RecordedCamera;
-use crate::recording::names::{natural_order, tidy};
+use crate::recording::names::{joint_name, natural_order, tidy};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -51,7 +51,7 @@ impl Info {
 /// Names in a list, or in lists by any keys, as older datasets have them: `{"motors": ["main_shoulder_pan", ...]}`.
 fn names(value: &Value) -> Vec<String> {
     match value {
-        Value::String(name) => vec![tidy(name.strip_suffix(".pos").unwrap_or(name))],
+        Value::String(name) => vec![joint_name(name)],
         Value::Array(list) => list.iter().flat_map(names).collect(),
         Value::Object(lists) => lists.values().flat_map(names).collect(),
         _ => Vec::new(),

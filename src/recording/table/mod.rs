@@ -20,6 +20,7 @@ mod csv;
 mod dataset;
 mod lerobot;
 mod parquet;
+mod remarks;
 mod samples;
 
 use super::{OpenOptions, Opened};

@@ -1,10 +1,11 @@
 //! Rows as samples.
 use super::columns::{Angle, Columns, PoseColumns, Rotation, Time};
+use super::remarks::{note_on_columns, nothing, without_effect};
 use super::{Actions, Angles, Rows};
 use crate::Error;
-use crate::error::suggestion;
 use crate::geometry::orientation;
-use crate::recording::clock::{LATEST, unit_of_date};
+use crate::recording::clock::{LATEST, are_far_apart, unit_of_date};
+use crate::recording::names::joint_name;
 use crate::recording::{
     Detection, OpenOptions, Opened, PointDetection, RecordedCamera, Recording, Sample, TargetDetection,
 };
@@ -55,7 +56,16 @@ pub(super) fn read(mut rows: impl Rows, options: &OpenOptions, cameras: &[Record
     if restarts > 0 {
         notes.push(format!("times begin anew {restarts} times, and are counted on from there, one second later"));
     }
-    if farthest > DAY && unit.is_none_or(|unit| unit == 1.0) {
+    let is_guessed = !is_typed && columns.time.is_some_and(|time| time.unit.is_none());
+    let is_far = is_guessed && are_far_apart(samples.iter().filter_map(|sample| sample.time));
+    if is_far && let Some(unit) = unit.filter(|unit| *unit != 1.0) {
+        return Err(Error::Unusable(format!(
+            "{}: times would be dates since 1970 in steps of {unit} s, and most rows a quarter of an hour or more apart: a clock that counts since \
+             its start needs a column `time_ms`, `time_us` or `time_ns`, which says its unit",
+            rows.file()
+        )));
+    }
+    if is_far || (farthest > DAY && unit.is_none_or(|unit| unit == 1.0)) {
         notes.push(format!(
             "rows are up to {farthest} s apart; where times are not in seconds, a column `time_ms`, `time_us` or `time_ns` says so"
         ));
@@ -70,7 +80,7 @@ pub(super) fn read(mut rows: impl Rows, options: &OpenOptions, cameras: &[Record
     let cameras = columns.cameras.iter().map(camera).collect();
     let mut recording = Recording { joints, cameras, features, samples };
     let file = rows.file();
-    let described = recording.describe_cameras(&options.cameras);
+    let described = recording.describe_those_there(&options.cameras);
     described.map_err(|problem| Error::Unusable(format!("{file}: {problem}")))?;
     Ok(Opened { recording: recording.checked_as(&file)?, notes, images })
 }
@@ -86,61 +96,6 @@ fn in_words(episodes: &BTreeSet<u64>) -> String {
         })
         .collect();
     if words.is_empty() { "none".to_owned() } else { words.join(", ") }
-}
-
-/// What the options name and the table does not have.
-fn without_effect(columns: &Columns, options: &OpenOptions) -> Option<String> {
-    let joints = || columns.joint_names.iter().map(String::as_str);
-    if let Angles::Degrees(named) = &options.table.angles
-        && let Some(name) = named.iter().find(|name| !columns.joint_names.contains(name))
-    {
-        return Some(format!("there is no joint `{name}` to take for degrees {}", suggestion(name, joints())));
-    }
-    (!options.table.episodes.is_empty() && columns.episode.is_none())
-        .then(|| "has no column `episode_index`, of which --episodes would name some".to_owned())
-}
-
-/// Why a table is no recording.
-fn nothing(file: &str, header: &[String], rows: usize) -> String {
-    let columns = header.join(", ");
-    match rows {
-        0 => format!("{file}: has no rows, only the columns {columns}"),
-        _ => format!(
-            "{file}: has no joints (`joints.NAME`, or columns that --joints of `handeye convert` names), no pose (`pose.x`) and no features \
-             (`CAMERA.FEATURE.u`); it has the columns {columns}"
-        ),
-    }
-}
-
-fn note_on_columns(columns: &Columns, options: &OpenOptions, left_out: &[String]) -> Vec<String> {
-    let mut notes = Vec::new();
-    let others: Vec<&str> = columns.others.iter().chain(left_out).map(String::as_str).collect();
-    if !others.is_empty() {
-        notes.push(format!("columns that say nothing of a recording are left out: {}", others.join(", ")));
-    }
-    if !columns.actions.is_empty() && options.table.actions == Actions::Unsaid {
-        let of = if columns.actions == columns.joint_names {
-            String::new()
-        } else {
-            format!(" (of {})", columns.actions.join(", "))
-        };
-        notes.push(format!(
-            "actions are left out{of}; --actions of `handeye convert` says whether they are targets or motions of the joints"
-        ));
-    }
-    let is_given = !options.joints.is_empty() || columns.joint_names == options.known_joints;
-    if !columns.joints.is_empty() && !is_given {
-        notes.push(format!(
-            "joints are in the order of the columns: {}; where that is not from base to tip, give a rig with these names or `handeye convert \
-             --joints`",
-            columns.joint_names.join(", ")
-        ));
-    }
-    let unsaid = columns.joints.iter().filter(|joint| !joint.in_degrees).count();
-    if unsaid > 0 && options.table.angles == Angles::Unsaid {
-        notes.push("joints are taken for radians or metres, since no column says `_deg`".to_owned());
-    }
-    notes
 }
 
 /// Samples as they come.
@@ -162,6 +117,8 @@ struct Reader<'a> {
     /// The seconds that one unit of the times takes; `None` before the first of those that do not say it.
     unit: Option<f64>,
     episode: Option<f64>,
+    /// True where the rows so far say nothing in the column of episodes.
+    episode_is_empty: Option<bool>,
     /// All that there are.
     episodes: BTreeSet<u64>,
     /// Where each joint stands, and what takes its numbers to radians or metres; `None`: they are that, as far as one can see.
@@ -176,7 +133,9 @@ impl<'a> Reader<'a> {
             let scale = match &options.table.angles {
                 _ if angle.in_degrees => Some(PI / 180.0),
                 Angles::Unsaid => None,
-                Angles::Degrees(named) if named.is_empty() || named.contains(joint) => Some(PI / 180.0),
+                Angles::Degrees(named) if named.is_empty() || named.iter().any(|name| joint_name(name) == *joint) => {
+                    Some(PI / 180.0)
+                }
                 Angles::Degrees(_) | Angles::Radians => Some(1.0),
             };
             (angle.column, scale)
@@ -197,6 +156,7 @@ impl<'a> Reader<'a> {
             farthest: 0.0,
             unit: if is_typed { Some(1.0) } else { columns.time.and_then(|time| time.unit) },
             episode: None,
+            episode_is_empty: None,
             episodes: BTreeSet::new(),
             joints: scales(&columns.joints),
             joint_action,
@@ -209,6 +169,12 @@ impl<'a> Reader<'a> {
         let mut is_next = false;
         if let Some(column) = columns.episode {
             let episode = row[column];
+            if self.episode_is_empty.replace(episode.is_nan()).is_some_and(|was_empty| was_empty != episode.is_nan()) {
+                return Err((
+                    column,
+                    "this is empty in some rows only: each row has to say its episode, or none".to_owned(),
+                ));
+            }
             if episode >= 0.0 {
                 self.episodes.insert(episode as u64);
             }
@@ -216,7 +182,7 @@ impl<'a> Reader<'a> {
             if !self.options.table.episodes.is_empty() && !self.options.table.episodes.iter().any(is_meant) {
                 return Ok(false);
             }
-            is_next = self.episode.is_some_and(|last| last != episode);
+            is_next = self.episode.is_some_and(|last| last != episode && !episode.is_nan());
             if is_next && let Some(last) = self.samples.last_mut() {
                 // It does not lead to the first row of the next episode.
                 (last.joint_action, last.pose_action) = (None, None);
@@ -272,7 +238,10 @@ impl<'a> Reader<'a> {
         if self.unit.is_none() {
             let (name, unit) = unit_of_date(number).unwrap_or(("seconds", 1.0));
             if unit != 1.0 {
-                self.notes.push(format!("times are taken for {name} since 1970: {number} would be no date in seconds"));
+                self.notes.push(format!(
+                    "times are taken for {name} since 1970: {number} would be no date in seconds; where a clock counts since its start, a column \
+                     `time_ms`, `time_us` or `time_ns` says so"
+                ));
             }
             self.unit = Some(unit);
             seconds = number * unit;
@@ -314,8 +283,8 @@ impl<'a> Reader<'a> {
             (value, None) => Err((
                 column,
                 format!(
-                    "{value} is more than two turns, and joints are in radians or metres: `handeye convert` takes them for degrees with \
-                     --degrees, and as they are with --radians"
+                    "{value} is more than two turns, and joints are in radians or metres: --degrees takes them for degrees, and --radians as \
+                     they are"
                 ),
             )),
         };

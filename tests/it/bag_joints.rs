@@ -1,0 +1,144 @@
+//! The joints of an arm in bags in which a gripper's come too.
+use crate::bag::{HEADER, HEADER_PARTS, JOINTS, images_beside, joint_state, read_with};
+use crate::cli::Folder;
+use handeye::recording::{OpenOptions, Opened};
+
+type Message = (&'static str, &'static str, String, u64, Vec<u8>);
+
+fn names<const N: usize>(names: [&str; N]) -> Vec<String> {
+    names.map(str::to_owned).to_vec()
+}
+
+fn state(topic: &'static str, time: u64, names: &[String], positions: &[f64]) -> Message {
+    let text = format!("{HEADER}{JOINTS}{HEADER_PARTS}");
+    (topic, "sensor_msgs/msg/JointState", text, time, joint_state(time, names, positions))
+}
+
+/// States every 25 ms, of an arm whose joints are the time and its half, and of a gripper that is before it each time.
+fn messages(of_time: impl Fn(u64, f64) -> Vec<Message>) -> Vec<Message> {
+    (0..20).map(|index| 900_000_000 + 25_000_000 * index).flat_map(|time| of_time(time, time as f64 / 1e9)).collect()
+}
+
+fn on_one_topic() -> Vec<Message> {
+    messages(|time, seconds| {
+        let gripper = state("/joint_states", time, &names(["finger"]), &[7.0]);
+        vec![gripper, state("/joint_states", time, &names(["a", "b"]), &[seconds, 0.5 * seconds])]
+    })
+}
+
+fn on_two_topics() -> Vec<Message> {
+    messages(|time, seconds| {
+        let gripper = state("/gripper/joint_states", time, &names(["finger"]), &[7.0]);
+        vec![gripper, state("/joint_states", time, &names(["a", "b"]), &[seconds, 0.5 * seconds])]
+    })
+}
+
+fn in_one_state() -> Vec<Message> {
+    messages(|time, seconds| {
+        vec![state("/joint_states", time, &names(["finger", "a", "b"]), &[7.0, seconds, 0.5 * seconds])]
+    })
+}
+
+fn assert_arm(opened: &Opened, what: &str) {
+    assert_eq!(opened.recording.joints, ["a", "b"], "{what}");
+    for (index, sample) in opened.recording.samples.iter().enumerate() {
+        let seconds = 1.0 + 0.1 * index as f64;
+        let [a, b] = sample.joints.as_ref().unwrap()[..] else { panic!("{what}") };
+        assert!((a - seconds).abs() < 1e-9 && (b - 0.5 * seconds).abs() < 1e-9, "{what}: {a} {b} at {seconds}");
+    }
+    let said: Vec<&String> = opened.notes.iter().filter(|note| note.contains("finger")).collect();
+    assert_eq!(said, ["joints that are left out: finger; those that are taken: a, b"], "{what}");
+}
+
+#[test]
+fn the_joints_of_the_rig_or_of_the_options_are_found_by_name_wherever_the_gripper_s_are() {
+    let folder = Folder::new("bag-gripper");
+    for (what, messages) in
+        [("one topic", on_one_topic()), ("two topics", on_two_topics()), ("one state", in_one_state())]
+    {
+        let bytes = images_beside(4, &messages);
+        let known_joints = names(["a", "b"]);
+        let of_rig = OpenOptions { known_joints, ..OpenOptions::default() };
+        assert_arm(&read_with(&bytes, &folder, &of_rig).unwrap(), what);
+        let named = OpenOptions { joints: names(["a", "b"]), ..OpenOptions::default() };
+        assert_arm(&read_with(&bytes, &folder, &named).unwrap(), what);
+        let joints = "[[robot.joints]]\nname = \"a\"\n[[robot.joints]]\nname = \"b\"\n";
+        folder.write("arm.toml", joints);
+        let (text, _) = folder.expect(0, "check arm.toml bag.mcap");
+        assert!(
+            text.contains("bag.mcap: joints that are left out: finger; those that are taken: a, b"),
+            "{what}: {text}"
+        );
+    }
+}
+
+#[test]
+fn without_names_the_state_of_most_joints_is_the_arm_s_and_two_topics_are_refused() {
+    let folder = Folder::new("bag-gripper-unnamed");
+    assert_arm(&read_with(&images_beside(4, &on_one_topic()), &folder, &OpenOptions::default()).unwrap(), "one topic");
+    let two = images_beside(4, &on_two_topics());
+    let error = read_with(&two, &folder, &OpenOptions::default()).unwrap_err().to_string();
+    assert!(error.ends_with("--joint-topic has to name one of /gripper/joint_states, /joint_states"), "{error}");
+    // All that is in one state may be the arm's, which is said.
+    let Opened { recording, notes, .. } =
+        read_with(&images_beside(4, &in_one_state()), &folder, &OpenOptions::default()).unwrap();
+    assert_eq!(recording.joints, ["finger", "a", "b"]);
+    assert!(notes.iter().any(|note| note.contains("first joint state: finger, a, b; where")), "{notes:?}");
+}
+
+#[test]
+fn joints_that_no_state_has_together_are_told_from_those_that_none_has() {
+    let folder = Folder::new("bag-gripper-apart");
+    let bytes = images_beside(4, &on_one_topic());
+    let error =
+        |joints| read_with(&bytes, &folder, &OpenOptions { joints, ..OpenOptions::default() }).unwrap_err().to_string();
+    let apart = error(names(["a", "finger"]));
+    assert!(apart.ends_with("no state has all of the joints a, finger; their joints are finger; a, b"), "{apart}");
+    let missing = error(names(["a", "c"]));
+    assert!(missing.ends_with("has no joint `c`; it has finger; a, b"), "{missing}");
+}
+
+#[test]
+fn points_in_joint_names_are_what_a_rig_can_call_them() {
+    let folder = Folder::new("bag-points-in-names");
+    let messages = messages(|time, seconds| vec![state("/joint_states", time, &names(["arm.a"]), &[seconds])]);
+    let options = OpenOptions { known_joints: names(["arm_a"]), ..OpenOptions::default() };
+    let Opened { recording, notes, .. } = read_with(&images_beside(4, &messages), &folder, &options).unwrap();
+    assert_eq!(recording.joints, ["arm_a"]);
+    assert!(!notes.iter().any(|note| note.contains("in the order of")), "{notes:?}");
+}
+
+#[test]
+fn states_of_an_arm_and_a_gripper_on_one_topic_are_told_apart_and_those_without_positions_say_nothing() {
+    let folder = Folder::new("bag-two-publishers");
+    let [arm, gripper] = [names(["a", "b"]), names(["finger", "thumb"])];
+    let mut others = Vec::new();
+    // Every 25 ms, in turns; the arm's joints are the time and its half. The first one has no positions.
+    for index in 0..20_u64 {
+        let time = 900_000_000 + 25_000_000 * index;
+        let seconds = time as f64 / 1e9;
+        let bytes = match index {
+            0 => joint_state(time, &arm, &[]),
+            _ if index % 2 == 0 || index == 1 => joint_state(time, &arm, &[seconds, 0.5 * seconds]),
+            _ => joint_state(time, &gripper, &[100.0, 200.0]),
+        };
+        others.push((
+            "/joint_states",
+            "sensor_msgs/msg/JointState",
+            format!("{HEADER}{JOINTS}{HEADER_PARTS}"),
+            time,
+            bytes,
+        ));
+    }
+    // Recorders write what comes late behind what came after it.
+    others[8..].reverse();
+    let Opened { recording, notes, .. } =
+        read_with(&images_beside(4, &others), &folder, &OpenOptions::default()).unwrap();
+    assert_eq!(recording.joints, ["a", "b"]);
+    for (index, sample) in recording.samples.iter().enumerate() {
+        let seconds = 1.0 + 0.1 * index as f64;
+        let [a, b] = sample.joints.as_ref().unwrap()[..] else { panic!() };
+        assert!((a - seconds).abs() < 1e-9 && (b - 0.5 * seconds).abs() < 1e-9, "{a} {b} at {seconds}");
+    }
+    assert!(notes.iter().any(|note| note.contains("10 joint states lack a joint or a position")), "{notes:?}");
+}
