@@ -22,7 +22,7 @@ pub struct Fitting {
     pub cameras: Vec<CameraErrors>,
     /// What does not fit.
     pub findings: Vec<Finding>,
-    /// Samples of the rest that are further off than noise explains, the worst first: each with its median distance.
+    /// Samples of the rest that are far further off than is usual, the worst first: each with its median distance.
     pub poor: Vec<(usize, Distance)>,
 }
 

@@ -64,8 +64,8 @@ impl Priors {
     }
 }
 
-/// What is assumed of the values that a rig and a recording's header give, in words: how far off they may be, by default or as the rig's
-/// `[estimate.prior]` says.
+/// What is assumed of the values that a rig and a recording's header give, in words: how far off they may be, by default or as `[estimate.prior]` of
+/// the rig says.
 pub fn assumptions(rig: &Rig, recording: &Recording) -> Vec<String> {
     let rig = &with_headers(rig, recording);
     let mm = |length: f64| format!("±{:.0} mm", 1e3 * length);
@@ -97,8 +97,8 @@ pub fn assumptions(rig: &Rig, recording: &Recording) -> Vec<String> {
         kinds[kind].2 += usize::from(is_assumed);
     }
     let defaults = kinds.into_iter().filter(|(.., count)| *count > 0).map(|(what, sd, count)| match what {
-        "pose of the base" => format!("{sd} on the {what} that the rig gives"),
-        _ => format!("{sd} on each of the {count} {what} that the rig or the recording gives"),
+        "pose of the base" => format!("{sd} on the {what}"),
+        _ => format!("{sd} on each of the {count} {what}"),
     });
     let stated =
         rig.estimate.prior.iter().map(|(path, sd)| format!("±{sd}{} on {path} as the rig states", units(rig, path)));

@@ -108,7 +108,7 @@ fn text(rig: &Rig, evaluation: &Evaluation) -> String {
     if !fitting.poor.is_empty() {
         let one = |(sample, off): &(usize, Distance)| format!("sample {sample} ({off:.1})");
         text += &format!(
-            "\nfurther off than noise explains, in the median: {}\n",
+            "\nfit worst, far beyond what is usual here in the median: {}\n",
             list(&fitting.poor.iter().map(one).collect::<Vec<_>>())
         );
     }

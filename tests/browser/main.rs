@@ -64,8 +64,8 @@ fn chromium() -> Option<&'static str> {
         .find(|name| Command::new(name).arg("--version").output().is_ok_and(|output| output.status.success()))
 }
 
-/// Pixels of the screen in one of the page, not 1, so that a drawing of too few shows.
-const RATIO: f64 = 1.5;
+/// Pixels of the screen in one of the page: not 1, so that a drawing of too few shows, and nothing that a binary fraction is.
+const RATIO: f64 = 1.1;
 
 /// How long a page may take.
 const PATIENCE: Duration = Duration::from_secs(60);
