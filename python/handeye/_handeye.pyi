@@ -200,7 +200,7 @@ class Recording:
         frames: tuple[str, str] | None = None,
         camera_topics: dict[str, str | None] | None = None,
         join: float | None = None,
-        degrees: bool | Sequence[str] | None = None,
+        degrees: bool | str | Sequence[str] | None = None,
         radians: bool = False,
         actions: Literal["targets", "motions"] | None = None,
         episodes: Sequence[int] | None = None,

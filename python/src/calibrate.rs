@@ -4,7 +4,7 @@ use crate::evaluate::by_camera;
 use crate::recording::Recording;
 use crate::rig::{AnyRig, Rig};
 use crate::work;
-use handeye::calibrate::{self as library, DeterminedBy, NoiseTrial, Options, Report};
+use handeye::calibrate::{self as library, DeterminedBy, NoiseTrial, Options, Report, length_in_words};
 use handeye::report::{Subject, html, suggestion};
 use handeye::rig;
 use pyo3::prelude::*;
@@ -304,7 +304,7 @@ pub struct TipDeviation {
 #[pymethods]
 impl TipDeviation {
     fn __repr__(&self) -> String {
-        let length = |length| if self.metric { format!("{:.3} mm", 1e3 * length) } else { format!("{length:.2e}") };
+        let length = |length| length_in_words(length, self.metric);
         let [median, largest, by_data] = [self.median, self.largest, self.by_data].map(length);
         format!("<handeye.TipDeviation median {median}, largest {largest}; {by_data} by the data alone>")
     }

@@ -1,16 +1,13 @@
 //! Least squares with residuals of one's own: `Graph` and `minimize`.
-use crate::arrays::{Floats, array, fixed, homogeneous, list, matrix, pose, three};
+use crate::arrays::{Floats, list, matrix, pose};
 use crate::errors::{not_done, raise, unusable};
-use crate::residual::Residual;
-use handeye::solvers::{
-    self, AnyKey, Covariance, Direction, DynamicVector, Iteration, Key, LevenbergMarquardt, Loss, Pose, Rotation,
-    Solver, Termination,
-};
-use nalgebra::{Matrix3, Vector3};
-use numpy::ndarray::ArrayViewD;
+use crate::minimization::Minimization;
+use crate::node::{GraphId, Handle, Kind, Node, Nodes, direction_of, rotation_of, vector_of};
+use crate::residual::{Functions, Residual};
+use handeye::solvers::{self, AnyKey, Covariance, Iteration, LevenbergMarquardt, Loss, Solver};
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 /// A least-squares problem with residuals of one's own as Python functions: for prototypes.
@@ -26,88 +23,10 @@ use std::sync::{Arc, Mutex};
 pub struct Graph {
     inner: solvers::Graph,
     nodes: Vec<Handle>,
+    /// Those of the factors, which `inner` has too.
+    functions: Vec<Arc<Functions>>,
     raised: Arc<Mutex<Option<PyErr>>>,
     id: GraphId,
-}
-
-/// What tells graphs apart: of every new one another.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
-struct GraphId(u64);
-
-impl Default for GraphId {
-    fn default() -> Self {
-        static NEXT: AtomicU64 = AtomicU64::new(0);
-        GraphId(NEXT.fetch_add(1, Ordering::Relaxed))
-    }
-}
-
-/// A node of a ``Graph``.
-#[pyclass(module = "handeye", frozen, eq, hash)]
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Node {
-    index: usize,
-    kind: Kind,
-    graph: GraphId,
-}
-
-/// What a node is.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-pub enum Kind {
-    Vector(usize),
-    Pose,
-    Rotation,
-    Direction,
-}
-
-impl Kind {
-    /// What of a node is stored, as Python has it.
-    pub fn to_python<'py>(self, py: Python<'py>, x: &[f64]) -> Bound<'py, PyAny> {
-        match self {
-            Kind::Vector(n) => array(py, &[n], x.to_vec()).into_any(),
-            Kind::Pose => homogeneous(py, &Pose::from_stored(x)).into_any(),
-            Kind::Rotation => {
-                array(py, &[3, 3], Matrix3::from_column_slice(x).transpose().as_slice().to_vec()).into_any()
-            }
-            Kind::Direction => array(py, &[3], x[..3].to_vec()).into_any(),
-        }
-    }
-
-    pub fn tangent(self) -> usize {
-        match self {
-            Kind::Vector(n) => n,
-            Kind::Pose => 6,
-            Kind::Rotation => 3,
-            Kind::Direction => 2,
-        }
-    }
-}
-
-#[derive(Clone, Copy)]
-enum Handle {
-    Vector(Key<DynamicVector>),
-    Pose(Key<Pose>),
-    Rotation(Key<Rotation>),
-    Direction(Key<Direction>),
-}
-
-#[pymethods]
-impl Node {
-    fn __repr__(&self) -> String {
-        let kind = match self.kind {
-            Kind::Vector(n) => format!("vector of {n}"),
-            Kind::Pose => "pose".to_owned(),
-            Kind::Rotation => "rotation".to_owned(),
-            Kind::Direction => "direction".to_owned(),
-        };
-        format!("<handeye.Node {}: {kind}>", self.index)
-    }
-}
-
-/// One node, or several.
-#[derive(FromPyObject)]
-pub enum Nodes<'py> {
-    One(Bound<'py, Node>),
-    Several(Vec<Bound<'py, Node>>),
 }
 
 #[pymethods]
@@ -173,8 +92,9 @@ impl Graph {
         };
         let keys: Vec<AnyKey> = nodes.iter().map(|node| self.any(node)).collect::<PyResult<_>>()?;
         let loss = loss_of(loss, width)?;
-        let mut residual =
-            Residual::new(residual, jacobian, nodes.iter().map(|node| node.kind).collect(), &self.raised);
+        let functions = Arc::new(Functions { residual, jacobian });
+        let kinds = nodes.iter().map(|node| node.kind).collect();
+        let mut residual = Residual::new(functions.clone(), kinds, &self.raised);
         let values: Vec<Bound<'_, PyAny>> = nodes.iter().map(|node| self.read(py, node)).collect::<PyResult<_>>()?;
         let rows = residual.count(py, values)?;
         let sigmas = match sigma {
@@ -187,6 +107,7 @@ impl Graph {
         }
         let settings = self.inner.dynamic_factor(residual, rows, &keys);
         settings.map_err(|error| unusable(error.to_string()))?.sigmas(&sigmas).loss(loss);
+        self.functions.push(functions);
         Ok(())
     }
 
@@ -297,14 +218,7 @@ impl Graph {
             minimizer.minimize_with(graph, &mut solver, &mut observer)
         });
         self.check()?;
-        let report = report.map_err(handeye::Error::from).map_err(raise)?;
-        Ok(Minimization {
-            iterations: report.iterations,
-            initial_cost: report.initial_cost,
-            final_cost: report.final_cost,
-            converged: report.termination.converged(),
-            termination: termination_in_words(report.termination),
-        })
+        Ok(report.map_err(handeye::Error::from).map_err(raise)?.into())
     }
 
     /// Covariance of a node's step where the nodes are now (Laplace's approximation), shape (steps, steps).
@@ -325,6 +239,17 @@ impl Graph {
         self.check()?;
         let found = found.map_err(|error: solvers::Error| not_done(error.to_string()))?;
         Ok(matrix(py, &found).into_any())
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        self.functions.iter().try_for_each(|functions| {
+            visit.call(&functions.residual)?;
+            visit.call(&functions.jacobian)
+        })
+    }
+
+    fn __clear__(&mut self) {
+        *self = Graph::default();
     }
 
     fn __repr__(&self) -> String {
@@ -375,30 +300,6 @@ impl Graph {
     }
 }
 
-fn vector_of(what: &str, view: ArrayViewD<'_, f64>, n: Option<usize>) -> PyResult<DynamicVector> {
-    let is_right = view.ndim() <= 1 && n.is_none_or(|n| n == view.len());
-    if !is_right || view.is_empty() {
-        let wanted = n.map_or_else(|| "(n,)".to_owned(), |n| format!("({n},)"));
-        return Err(unusable(format!("{what}: shape {:?}, and {wanted} would do", view.shape())));
-    }
-    Ok(DynamicVector::from_iterator(view.len(), view.iter().copied()))
-}
-
-fn rotation_of(what: &str, matrix: &Floats<'_>) -> PyResult<Rotation> {
-    let view = fixed::<numpy::ndarray::Ix2>(what, matrix.as_array(), "(3, 3)")?;
-    if view.shape() != [3, 3] {
-        return Err(unusable(format!("{what}: shape {:?}, and (3, 3) would do", view.shape())));
-    }
-    let mut homogeneous = numpy::ndarray::Array2::<f64>::eye(4);
-    homogeneous.slice_mut(numpy::ndarray::s![..3, ..3]).assign(&view);
-    Ok(Rotation(pose(what, homogeneous.view().into_dyn())?.rotation))
-}
-
-fn direction_of(what: &str, numbers: &Floats<'_>) -> PyResult<Direction> {
-    let vector: Vector3<f64> = three(what, numbers)?;
-    Direction::new(vector).ok_or_else(|| unusable(format!("{what}: of length 0")))
-}
-
 fn loss_of(name: &str, width: f64) -> PyResult<Loss> {
     if width.is_nan() || width <= 0.0 {
         return Err(unusable(format!("width: {width} standard deviations, and it has to be above 0")));
@@ -409,41 +310,5 @@ fn loss_of(name: &str, width: f64) -> PyResult<Loss> {
         "cauchy" => Ok(Loss::Cauchy(width)),
         "geman-mcclure" => Ok(Loss::GemanMcClure(width)),
         _ => Err(unusable(format!("loss: unknown `{name}` (known: squared, huber, cauchy, geman-mcclure)"))),
-    }
-}
-
-fn termination_in_words(termination: Termination) -> &'static str {
-    match termination {
-        Termination::CostTolerance => "the cost no longer changes",
-        Termination::StepTolerance => "the step no longer changes the values",
-        Termination::GradientTolerance => "the gradient vanishes",
-        Termination::NoProgress => "no step lowers the cost",
-        Termination::IterationLimit => "the most iterations allowed were taken",
-        Termination::Cancelled => "cancelled",
-    }
-}
-
-/// What a minimiser did.
-#[pyclass(module = "handeye", frozen, get_all)]
-pub struct Minimization {
-    /// Steps tried, the rejected ones included.
-    iterations: usize,
-    /// Sum of rho / 2 at the start.
-    initial_cost: f64,
-    /// Sum of rho / 2 at the end.
-    final_cost: f64,
-    /// True where a minimum was reached, as far as can be told.
-    converged: bool,
-    /// Why it stopped, in words.
-    termination: &'static str,
-}
-
-#[pymethods]
-impl Minimization {
-    fn __repr__(&self) -> String {
-        let Minimization { iterations, initial_cost, final_cost, termination, .. } = self;
-        format!(
-            "<handeye.Minimization {iterations} iterations, cost {initial_cost:.4e} -> {final_cost:.4e}: {termination}>"
-        )
     }
 }

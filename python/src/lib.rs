@@ -7,6 +7,8 @@ mod evaluate;
 mod graph;
 mod infer;
 mod inverse;
+mod minimization;
+mod node;
 mod recording;
 mod recording_arrays;
 mod residual;
@@ -30,11 +32,13 @@ mod _handeye {
     #[pymodule_export]
     use crate::evaluate::{Errors, Evaluation, evaluate, residuals};
     #[pymodule_export]
-    use crate::graph::{Graph, Minimization, Node};
+    use crate::graph::Graph;
     #[pymodule_export]
     use crate::infer::{Branch, Inference, Inferred, InferredPose, infer};
     #[pymodule_export]
     use crate::inverse::{InverseKinematics, Reached};
+    use crate::minimization::Minimization;
+    use crate::node::Node;
     #[pymodule_export]
     use crate::recording::Recording;
     #[pymodule_export]

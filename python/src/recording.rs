@@ -44,11 +44,16 @@ pub enum Paths {
     Several(Vec<PathBuf>),
 }
 
-/// Whether all joints are in degrees, or which.
-#[derive(FromPyObject, PartialEq)]
-enum Degrees {
-    All(bool),
-    Some(Vec<String>),
+/// Which joints are in degrees: no names for all of them, `None` for none.
+fn in_degrees(given: &Bound<'_, PyAny>) -> PyResult<Option<Vec<String>>> {
+    if let Ok(all) = given.extract::<bool>() {
+        return Ok(all.then(Vec::new));
+    }
+    let names = given.extract::<String>().map(|name| vec![name]).or_else(|_| given.extract::<Vec<String>>());
+    match names {
+        Ok(names) => Ok((!names.is_empty()).then_some(names)),
+        Err(_) => Err(unusable(format!("degrees: true, or names of joints, are meant, and not {}", given.repr()?))),
+    }
 }
 
 fn refuse_without_effect(options: &[(&str, bool)], kind: &str, is_read: bool) -> PyResult<()> {
@@ -87,7 +92,7 @@ impl Recording {
         frames: Option<[String; 2]>,
         camera_topics: Option<BTreeMap<String, Option<String>>>,
         join: Option<f64>,
-        degrees: Option<Degrees>,
+        degrees: Option<Bound<'_, PyAny>>,
         radians: bool,
         actions: Option<&str>,
         episodes: Option<Vec<u64>>,
@@ -97,8 +102,7 @@ impl Recording {
             Paths::One(path) => vec![path],
             Paths::Several(paths) => paths,
         };
-        let degrees = degrees.unwrap_or(Degrees::All(false));
-        let in_degrees = degrees != Degrees::All(false);
+        let degrees = degrees.as_ref().map(in_degrees).transpose()?.flatten();
         let formats: Vec<Format> = paths.iter().map(|path| Format::of(path)).collect();
         let of_bags = [
             ("joint_topic", joint_topic.is_some()),
@@ -108,7 +112,7 @@ impl Recording {
             ("join", join.is_some()),
         ];
         let of_tables = [
-            ("degrees", in_degrees),
+            ("degrees", degrees.is_some()),
             ("radians", radians),
             ("actions", actions.is_some()),
             ("episodes", episodes.is_some()),
@@ -116,15 +120,16 @@ impl Recording {
         let is_bag = |format: &Format| *format == Format::Bag;
         let is_table = |format: &Format| !matches!(format, Format::Bag | Format::JsonLines);
         refuse_without_effect(&of_bags, "a bag", formats.iter().any(is_bag))?;
+        let has_columns = formats.iter().any(|format| *format != Format::JsonLines);
+        refuse_without_effect(&[("joints", joints.is_some())], "a bag or a table", has_columns)?;
         refuse_without_effect(&of_tables, "a table", formats.iter().any(is_table))?;
-        if in_degrees && radians {
+        if degrees.is_some() && radians {
             return Err(unusable("degrees and radians: joints are in one of them"));
         }
         let angles = match degrees {
-            Degrees::Some(names) => Angles::Degrees(names),
-            Degrees::All(true) => Angles::Degrees(Vec::new()),
-            Degrees::All(false) if radians => Angles::Radians,
-            Degrees::All(false) => Angles::Unsaid,
+            Some(names) => Angles::Degrees(names),
+            None if radians => Angles::Radians,
+            None => Angles::Unsaid,
         };
         let actions = match actions {
             None => Actions::Unsaid,

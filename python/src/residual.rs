@@ -1,17 +1,23 @@
 //! A residual that a Python function computes.
 use crate::arrays::{Floats, fixed};
 use crate::errors::unusable;
-use crate::graph::Kind;
+use crate::node::Kind;
 use handeye::solvers::{DynamicFactor, Jacobian};
 use numpy::ndarray::Ix2;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The function, its derivatives where they are given, and what it is on.
+/// What is called.
+pub struct Functions {
+    pub residual: Py<PyAny>,
+    /// Its derivatives, where they are given.
+    pub jacobian: Option<Py<PyAny>>,
+}
+
+/// The functions and what they are on.
 pub struct Residual {
-    function: Py<PyAny>,
-    jacobian: Option<Py<PyAny>>,
+    functions: Arc<Functions>,
     kinds: Vec<Kind>,
     rows: usize,
     /// What the functions of a graph have raised.
@@ -19,25 +25,20 @@ pub struct Residual {
 }
 
 impl Residual {
-    pub fn new(
-        function: Py<PyAny>,
-        jacobian: Option<Py<PyAny>>,
-        kinds: Vec<Kind>,
-        raised: &Arc<Mutex<Option<PyErr>>>,
-    ) -> Self {
-        Residual { function, jacobian, kinds, rows: 0, raised: raised.clone() }
+    pub fn new(functions: Arc<Functions>, kinds: Vec<Kind>, raised: &Arc<Mutex<Option<PyErr>>>) -> Self {
+        Residual { functions, kinds, rows: 0, raised: raised.clone() }
     }
 
     /// How many rows the residual has, and, where derivatives are given, that these are of the right shape.
     pub fn count(&mut self, py: Python<'_>, values: Vec<Bound<'_, PyAny>>) -> PyResult<usize> {
         let values = PyTuple::new(py, values)?;
-        let r: Floats<'_> = self.function.call1(py, values.clone())?.extract(py)?;
+        let r: Floats<'_> = self.functions.residual.call1(py, values.clone())?.extract(py)?;
         let view = r.as_array();
         if view.ndim() > 1 || view.is_empty() {
             return Err(unusable(format!("a residual of shape {:?}, and a number or (rows,) would do", view.shape())));
         }
         self.rows = view.len();
-        if self.jacobian.is_some() {
+        if self.functions.jacobian.is_some() {
             self.slopes(py, values, |_, _, _| {})?;
         }
         Ok(self.rows)
@@ -48,7 +49,7 @@ impl Residual {
     }
 
     fn call(&self, py: Python<'_>, values: Bound<'_, PyTuple>, r: &mut [f64]) -> PyResult<()> {
-        let given: Floats<'_> = self.function.call1(py, values)?.extract(py)?;
+        let given: Floats<'_> = self.functions.residual.call1(py, values)?.extract(py)?;
         let view = given.as_array();
         if view.len() != r.len() || view.ndim() > 1 {
             return Err(unusable(format!("a residual of shape {:?}, which had {} rows before", view.shape(), r.len())));
@@ -64,7 +65,7 @@ impl Residual {
         values: Bound<'_, PyTuple>,
         mut each: impl FnMut(usize, usize, f64),
     ) -> PyResult<()> {
-        let Some(jacobian) = &self.jacobian else { return Ok(()) };
+        let Some(jacobian) = &self.functions.jacobian else { return Ok(()) };
         let width: usize = self.kinds.iter().map(|kind| kind.tangent()).sum();
         let shape = format!("({}, {width})", self.rows);
         let given: Floats<'_> = jacobian.call1(py, values)?.extract(py)?;
@@ -103,7 +104,7 @@ impl DynamicFactor for Residual {
     }
 
     fn linearize(&self, x: &[&[f64]], r: &mut [f64], jacobian: &mut Jacobian<'_>) -> bool {
-        if self.jacobian.is_none() {
+        if self.functions.jacobian.is_none() {
             return false;
         }
         DynamicFactor::residual(self, x, r);

@@ -25,6 +25,12 @@ impl Layout {
         Layout { cameras: cameras.into(), n_features }
     }
 
+    /// Refuses what is of another rig: indices of a camera and a feature that are not here.
+    pub fn check_has(&self, whose: &str, camera: usize, feature: usize) -> PyResult<()> {
+        is_known(whose, "camera", camera, self.cameras.len())?;
+        is_known(whose, "feature", feature, self.n_features)
+    }
+
     /// Pixels: camera -> (n_features, 2), NaN where not seen.
     pub fn pixels(&self, pixels: &Bound<'_, PyDict>, found: &mut Vec<Sighting>) -> PyResult<()> {
         found.clear();
@@ -86,4 +92,10 @@ impl Layout {
             "camera `{name}`: shape {shape:?}, and ({n}, {width}) would do, in the order of the features"
         )))
     }
+}
+
+/// Refuses the index of something that a rig does not have.
+pub fn is_known(whose: &str, what: &str, index: usize, n: usize) -> PyResult<()> {
+    let problem = || unusable(format!("{whose}: one is of {what} {index} (from 0) of its rig, and this one has {n}"));
+    if index < n { Ok(()) } else { Err(problem()) }
 }

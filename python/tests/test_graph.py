@@ -1,5 +1,8 @@
 """Residuals of one's own: against closed forms, NumPy and figures of NIST."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 
@@ -150,3 +153,28 @@ def test_a_node_of_another_graph_is_refused_even_where_there_is_one_like_it():
         with pytest.raises(handeye.UnusableInput, match="is of another graph"):
             wrong()
     np.testing.assert_array_equal(graph.value(x), [1.0, 2.0])
+
+
+class Owner:
+    """Holds the graph that calls it: a cycle that only the collector sees."""
+
+    def __init__(self):
+        self.graph = handeye.Graph()
+        self.x = self.graph.vector([0.0])
+        self.graph.factor(self.residual, self.x, jacobian=self.slope)
+
+    def residual(self, x):
+        return x - 1.0
+
+    def slope(self, x):
+        return np.ones((1, 1))
+
+
+def test_a_graph_that_calls_its_owner_works_and_is_collected():
+    owner = Owner()
+    owner.graph.minimize()
+    np.testing.assert_allclose(owner.graph.value(owner.x), [1.0])
+    is_there = weakref.ref(owner)
+    del owner
+    gc.collect()
+    assert is_there() is None

@@ -214,6 +214,7 @@ def test_options_of_other_formats_and_words_that_say_nothing_are_refused(motions
         ({"frames": ("base", "tip")}, "frames: none of the recordings is a bag, so that it has no effect"),
         ({"camera_topics": {}}, "camera_topics: none of the recordings is a bag"),
         ({"degrees": True}, "degrees: none of the recordings is a table"),
+        ({"joints": ["a"]}, "joints: none of the recordings is a bag or a table, so that it has no effect"),
         ({"episodes": [0]}, "episodes: none of the recordings is a table"),
         ({"cameras": {"nose": {"size": (640, 480)}}}, "there are no images of a camera `nose`"),
     ]:
@@ -236,6 +237,12 @@ def test_tables_say_their_units_actions_and_lenses_by_keywords(tmp_path):
     np.testing.assert_allclose(read.joints, [[np.pi / 2, 0.2], [np.deg2rad(80), 0.1]])
     np.testing.assert_allclose(read.joint_actions[0], [np.deg2rad(1), 0.1])
     assert read.cameras["left"]["fy"] == 601.0 and read.cameras["left"]["size"] == (640, 480)
+    with pytest.warns(UserWarning):
+        assert np.array_equal(read.joints, handeye.Recording.load(table, degrees="a").joints)
+    with pytest.raises(handeye.UnusableInput, match="degrees"):
+        handeye.Recording.load(table, degrees=[])
+    with pytest.raises(handeye.UnusableInput, match="degrees: true, or names of joints, are meant, and not 3"):
+        handeye.Recording.load(table, degrees=3)
     with pytest.raises(handeye.UnusableInput, match="neither targets nor motions"):
         handeye.Recording.load(table, degrees=["a"], actions="target")
     with pytest.raises(handeye.UnusableInput, match="joints are in one of them"):

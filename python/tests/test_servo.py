@@ -1,5 +1,8 @@
 """Steps, limits, controllers and loops, carried out by a robot that is the rig itself, or another one."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 
@@ -174,6 +177,47 @@ def test_limits_refuse_what_makes_no_sense(ur5):
     ]:
         with pytest.raises(handeye.UnusableInput, match=message):
             wrong()
+
+
+def test_limits_and_tasks_of_another_rig_are_refused(ur5, places):
+    pixels = ur5.predict(places[0])
+    other = handeye.random_rig(6, cameras=3, features=12, seed=1)
+    far = servo.InImage(other, list(other.cameras)[2])
+    controller = servo.ImageBased(ur5)
+    controller.aim(ur5.predict(places[1]))
+    loop = servo.ServoLoop(controller)
+    stepper = servo.Stepper(ur5)
+    target = servo.JointTarget(places[1])
+    for limit, message in [
+        (far, r"camera 2 \(from 0\) of its rig, and this one has 2"),
+        (servo.LinkDistance([0, 9], [[0, 0, 0], [0, 0, 0]], 0.1), r"link 9 \(from 0\) of its rig, and this one has 7"),
+    ]:
+        for use in [
+            lambda: controller.decide(pixels, places[0], dt=0.1, limits=[limit]),
+            lambda: loop.tick(0.0, pixels, places[0], dt=0.1, limits=[limit]),
+            lambda: stepper.step(places[0], [target], dt=0.1, limits=[limit]),
+        ]:
+            with pytest.raises(ValueError, match=message):
+                use()
+    points = servo.ImagePoints(other, other.predict(np.zeros(6)))
+    with pytest.raises(ValueError, match=r"camera 2 \(from 0\) of its rig, and this one has 2"):
+        stepper.step(places[0], [points], dt=0.1)
+
+
+class Holder:
+    """Holds what calls it: a cycle that only the collector sees."""
+
+    def change(self, joints):
+        return np.zeros(1), np.zeros((1, len(joints)))
+
+
+def test_a_task_that_calls_its_owner_is_collected():
+    owner = Holder()
+    owner.goal = servo.Goal(servo.FunctionTask(owner.change))
+    is_there = weakref.ref(owner)
+    del owner
+    gc.collect()
+    assert is_there() is None
 
 
 def test_bounds_of_a_learned_rig_hold_what_it_is_off_by(learned, ur5, places):

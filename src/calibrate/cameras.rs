@@ -16,24 +16,40 @@ pub(crate) struct KnownIntrinsics {
 /// Focal length [longer side of the image] where nobody gives one.
 const FOCAL_GUESS: f64 = 1.2;
 
+/// Fills in what a recording's header says of a camera beside the rig.
+fn fill_from_header(camera: &mut Camera, header: &RecordedCamera) {
+    camera.size = camera.size.or(header.size);
+    camera.model = camera.model.or(header.model);
+    camera.fx = camera.fx.or(header.fx);
+    camera.fy = camera.fy.or(header.fy);
+    camera.cx = camera.cx.or(header.cx);
+    camera.cy = camera.cy.or(header.cy);
+    if camera.distortion.is_none() && (camera.model == header.model || header.model.is_none()) {
+        camera.distortion.clone_from(&header.distortion);
+    }
+}
+
+/// What learning starts from: a rig, and of its cameras what a recording's header says besides.
+pub(crate) fn with_headers(rig: &Rig, recording: &Recording) -> Rig {
+    let mut rig = rig.clone();
+    for recorded in &recording.cameras {
+        if rig.cameras.iter().all(|camera| camera.name != recorded.name) {
+            rig.cameras.push(Camera { name: recorded.name.clone(), ..Camera::default() });
+        }
+        let is_it = |camera: &&mut Camera| camera.name == recorded.name;
+        rig.cameras.iter_mut().filter(is_it).for_each(|camera| fill_from_header(camera, recorded));
+    }
+    rig
+}
+
 /// Fills in what the header says, and guesses the rest; nothing of a lens that nobody speaks of and nothing was seen through.
 pub(super) fn complete_camera(
     camera: &mut Camera,
     recorded: Option<&RecordedCamera>,
     recording: &Recording,
 ) -> Result<KnownIntrinsics, Error> {
-    let header = recorded.cloned().unwrap_or_default();
-    if recorded.is_some() {
-        camera.size = camera.size.or(header.size);
-        camera.model = camera.model.or(header.model);
-        let same_model = camera.model == header.model || header.model.is_none();
-        camera.fx = camera.fx.or(header.fx);
-        camera.fy = camera.fy.or(header.fy);
-        camera.cx = camera.cx.or(header.cx);
-        camera.cy = camera.cy.or(header.cy);
-        if same_model && camera.distortion.is_none() {
-            camera.distortion = header.distortion;
-        }
+    if let Some(header) = recorded {
+        fill_from_header(camera, header);
     }
     let (gives_pixels, gives_points) = gives(camera, recording);
     camera.depth |= gives_points;

@@ -1,9 +1,10 @@
 //! Predicts the detections of a recording and compares.
-use super::Fitting;
+use super::observation::Kind;
+use super::placed::Placed;
+use super::{Fitting, ReadingNoise};
 use crate::Error;
 use crate::recording::{Recording, Sample};
 use crate::rig::{Camera, Model, Rig};
-use nalgebra::Vector3;
 
 /// Distances between what a rig predicts and what was seen. Those in px are of pixels, and 0 where there are none.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -55,7 +56,8 @@ pub struct CameraErrors {
 pub struct Evaluation {
     /// Samples with joints or a tip pose, and at least one comparable detection.
     pub samples: usize,
-    /// Detections left out because the rig does not know their camera or feature, or because their sample has neither joints nor a tip pose.
+    /// Detections left out because the rig does not know their camera or feature, or because their sample has neither joints nor a tip pose
+    /// from which they follow.
     pub rejected: usize,
     /// Over all cameras.
     pub total: Errors,
@@ -67,6 +69,8 @@ pub struct Evaluation {
     pub sample_median_m: Vec<Option<f64>>,
     /// The same errors without the images, samples and detections that do not fit, and which these are.
     pub fitting: Fitting,
+    /// What noise of the readings alone gives such errors, over all cameras and per camera of the rig.
+    pub reading_noise: (ReadingNoise, Vec<ReadingNoise>),
 }
 
 /// Distances of single detections from where they are predicted.
@@ -112,7 +116,9 @@ pub fn evaluate(rig: &Rig, recording: &Recording) -> Result<Evaluation, Error> {
         rejected: 0,
     };
     evaluation.cameras = rig.cameras.iter().zip(&of_camera).map(errors).collect();
-    evaluation.fitting = Fitting::new(rig, recording, &samples);
+    let model = Model::new(rig)?;
+    evaluation.fitting = Fitting::new(rig, &model, recording, &samples);
+    evaluation.reading_noise = ReadingNoise::new(rig, &model, recording);
     Ok(evaluation)
 }
 
@@ -143,33 +149,26 @@ pub fn distances(rig: &Rig, recording: &Recording) -> Result<Vec<SampleDistances
 }
 
 pub(crate) fn of_sample(model: &Model, index: &Correspondence, sample: &Sample) -> SampleDistances {
-    let mut found = SampleDistances { cameras: vec![Distances::default(); model.cameras.len()], rejected: 0 };
-    let from_pose = || sample.pose.map(|tip| vec![model.base, tip]);
-    let links = sample.joints.as_ref().map(|joints| model.links(joints)).or_else(from_pose);
-    let Some(links) = links else {
-        found.rejected = sample.pixels.len() + sample.points.len();
-        return found;
-    };
-    let known = |camera: u32, feature: u32| Some((index.cameras[camera as usize]?, index.features[feature as usize]?));
-    for seen in &sample.pixels {
-        let known = known(seen.camera, seen.feature).filter(|(camera, _)| model.cameras[*camera].has_lens());
-        let Some((camera, feature)) = known else {
-            found.rejected += 1;
-            continue;
-        };
-        let [u, v] = model.pixel(camera, feature, &links);
-        let behind = !model.cameras[camera].model.is_in_front(&model.in_camera(camera, feature, &links));
-        found.cameras[camera].pixels.push(((u - seen.pixel[0]).hypot(v - seen.pixel[1]), behind));
+    let mut cameras = vec![Distances::default(); model.cameras.len()];
+    let placed = Placed::read(model, sample);
+    let predictable = placed.as_ref().map(|placed| (placed, placed.predictable(model, index, sample)));
+    let mut n_predicted = 0;
+    if let Some((Placed { links, .. }, predictable)) = predictable {
+        n_predicted = predictable.len();
+        for seen in predictable {
+            let of_camera = &mut cameras[seen.camera];
+            let distance = seen.error(model, links).norm();
+            let is_in_front = |point| model.cameras[seen.camera].model.is_in_front(&point);
+            match seen.kind() {
+                Kind::Pixels => {
+                    let behind = !is_in_front(model.in_camera(seen.camera, seen.feature, links));
+                    of_camera.pixels.push((distance, behind));
+                }
+                Kind::Points => of_camera.points.push(distance),
+            }
+        }
     }
-    for seen in &sample.points {
-        let Some((camera, feature)) = known(seen.camera, seen.feature) else {
-            found.rejected += 1;
-            continue;
-        };
-        let off = model.in_camera(camera, feature, &links) - Vector3::from(seen.point);
-        found.cameras[camera].points.push(off.norm());
-    }
-    found
+    SampleDistances { cameras, rejected: sample.pixels.len() + sample.points.len() - n_predicted }
 }
 
 /// Which camera and feature of a rig each of a recording's is, by name.

@@ -1,6 +1,7 @@
 //! The learned rig and its account, from the final state.
 use super::deviations::Deviations;
 use super::evaluate::{Distances, Errors};
+use super::gauge;
 use super::graph::{State, row};
 use super::lengths;
 use super::observation::Kind;
@@ -93,6 +94,7 @@ pub(crate) fn finish(
         cameras,
         stages,
         converged,
+        metric: gauge::length_is_known(setup),
         gauge,
         noise: None,
         states: setup.states.words(&setup.rig.noise),

@@ -1,14 +1,17 @@
 //! What of a recording does not fit a rig that is evaluated, by the tests by which a calibration leaves it out, and the errors without it.
 use super::evaluate::{SampleDistances, median, of_sample};
 use super::observation::Kind;
-use super::outliers::{DETECTION, IMAGE, IN_IMAGE, Image, Wrong, wrong};
-use super::{CameraErrors, Correspondence, Distances, Errors, Finding};
+use super::outliers::{IN_IMAGE, Image, Wrong, fits_swapped, images_of, is_wrong, swapped_with, wrong, yardstick};
+use super::{CameraErrors, Correspondence, Distance, Distances, Errors, Finding};
 use crate::recording::{Recording, Sample};
 use crate::rig::{Model, Noise, Rig};
 use std::collections::BTreeMap;
 
 /// Rounds of judging: what is left out no longer counts towards what is usual.
 const ROUNDS: usize = 2;
+
+/// A sample that is not wrong fits poorly where its median distance is beyond this many yardsticks; noise gives 1.2 to 1.5.
+const POOR: f64 = 3.0;
 
 /// Errors without what does not fit.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -19,11 +22,13 @@ pub struct Fitting {
     pub cameras: Vec<CameraErrors>,
     /// What does not fit.
     pub findings: Vec<Finding>,
+    /// Samples of the rest that are far further off than is usual, the worst first: each with its median distance.
+    pub poor: Vec<(usize, Distance)>,
 }
 
 impl Fitting {
     /// Of the distances of every sample.
-    pub(crate) fn new(rig: &Rig, recording: &Recording, samples: &[SampleDistances]) -> Fitting {
+    pub(crate) fn new(rig: &Rig, model: &Model, recording: &Recording, samples: &[SampleDistances]) -> Fitting {
         let mut yardsticks = yardsticks(&rig.noise, samples, |_, _| true);
         let mut judged = judge(rig, samples, yardsticks);
         for _ in 1..ROUNDS {
@@ -41,7 +46,7 @@ impl Fitting {
                 let before = used.pixels.len() + used.points.len();
                 let mut keep = |kind: Kind, distance: f64| {
                     let out = is_out(&wrong, (sample, camera, kind));
-                    let alone = distance > DETECTION * yardsticks[kind as usize];
+                    let alone = is_wrong(distance, yardsticks[kind as usize]);
                     single += usize::from(!out && alone);
                     !out && !alone
                 };
@@ -57,8 +62,12 @@ impl Fitting {
             errors: Errors::new(used),
             rejected: *rejected,
         });
-        let mut fitting = Fitting { total: Errors::new(&total), cameras: cameras.collect(), findings: Vec::new() };
-        fitting.findings = findings(rig, recording, &wrong, &medians, yardsticks);
+        let mut fitting = Fitting {
+            total: Errors::new(&total),
+            cameras: cameras.collect(),
+            findings: findings(model, rig, recording, &wrong, &medians, yardsticks),
+            poor: poor(samples, &wrong, yardsticks),
+        };
         if single > 0 {
             let of =
                 samples.iter().flat_map(|sample| &sample.cameras).map(|one| one.pixels.len() + one.points.len()).sum();
@@ -66,6 +75,24 @@ impl Fitting {
         }
         fitting
     }
+}
+
+/// Samples that are used and fit poorly, by their pixels or, where there are none, their points.
+fn poor(samples: &[SampleDistances], wrong: &Wrong, yardsticks: [f64; 2]) -> Vec<(usize, Distance)> {
+    let of_sample = |sample: usize| {
+        let cameras = || samples[sample].cameras.iter().enumerate();
+        let used = |kind: Kind| cameras().filter(move |(camera, _)| !is_out(wrong, (sample, *camera, kind)));
+        let mut found = Kind::ALL.into_iter().map(|kind| {
+            let mut distances: Vec<f64> = used(kind).flat_map(|(_, seen)| of_kind(seen, kind)).collect();
+            (kind, distances.len(), median(&mut distances))
+        });
+        let (kind, _, off) = found.find(|(_, count, _)| *count > 0)?;
+        let yardsticks_off = off / yardsticks[kind as usize];
+        (yardsticks_off > POOR).then(|| (yardsticks_off, (sample, kind.distance(off))))
+    };
+    let mut poor: Vec<_> = (0..samples.len()).filter_map(of_sample).collect();
+    poor.sort_by(|a, b| b.0.total_cmp(&a.0));
+    poor.into_iter().map(|(_, one)| one).collect()
 }
 
 fn is_out(wrong: &Wrong, image: Image) -> bool {
@@ -89,7 +116,7 @@ fn yardsticks(noise: &Noise, samples: &[SampleDistances], counts: impl Fn(usize,
             all.extend(used.flat_map(|(_, seen)| of_kind(seen, kind)));
         }
         let stated = if kind == Kind::Pixels { noise.pixels } else { noise.points };
-        (median(&mut all) / kind.median_distance()).max(stated)
+        yardstick(kind, stated, &mut all)
     })
 }
 
@@ -110,6 +137,7 @@ fn judge(rig: &Rig, samples: &[SampleDistances], yardsticks: [f64; 2]) -> (Wrong
 }
 
 fn findings(
+    model: &Model,
     rig: &Rig,
     recording: &Recording,
     wrong: &Wrong,
@@ -117,13 +145,21 @@ fn findings(
     yardsticks: [f64; 2],
 ) -> Vec<Finding> {
     let off = |image: &Image| image.2.distance(medians[image] * yardsticks[image.2 as usize]);
+    let index = Correspondence::new(rig, recording);
+    let fits = |images: usize, read: usize| {
+        let (joints, pose) = (recording.samples[read].joints.clone(), recording.samples[read].pose);
+        let seen = of_sample(model, &index, &Sample { joints, pose, ..recording.samples[images].clone() });
+        let still = seen.cameras.iter().enumerate().filter(|(camera, _)| !wrong.moved[*camera]);
+        let over = |seen, kind: Kind| of_kind(seen, kind).into_iter().map(move |d| d / yardsticks[kind as usize]);
+        fits_swapped(still.flat_map(|(_, seen)| Kind::ALL.into_iter().flat_map(move |kind| over(seen, kind))).collect())
+    };
     let mut findings = Vec::new();
     for &sample in &wrong.joints {
-        let images = medians.iter().filter(|(key, _)| key.0 == sample && !wrong.moved[key.1]);
+        let images = images_of(medians, sample).filter(|(key, _)| !wrong.moved[key.1]);
         let mut images: Vec<(&Image, &f64)> = images.collect();
         images.sort_by(|a, b| a.1.total_cmp(b.1));
         let Some((usual, _)) = images.get(images.len() / 2) else { continue };
-        let swapped_with = swapped_with(rig, recording, wrong, sample, yardsticks);
+        let swapped_with = swapped_with(&wrong.joints, sample, fits);
         let by_pose = recording.samples[sample].joints.is_none();
         findings.push(Finding::WrongJoints { sample, off: off(usual), swapped_with, by_pose });
     }
@@ -138,24 +174,4 @@ fn findings(
         }
     }
     findings
-}
-
-/// The other sample whose images fit what was read in this one, and the other way round.
-fn swapped_with(rig: &Rig, recording: &Recording, wrong: &Wrong, sample: usize, yardsticks: [f64; 2]) -> Option<usize> {
-    let model = Model::new(rig).ok()?;
-    let index = Correspondence::new(rig, recording);
-    let samples = &recording.samples;
-    let fits = |images: usize, read: usize| {
-        let (joints, pose) = (samples[read].joints.clone(), samples[read].pose);
-        let seen = of_sample(&model, &index, &Sample { joints, pose, ..samples[images].clone() });
-        let still = seen.cameras.iter().enumerate().filter(|(camera, _)| !wrong.moved[*camera]);
-        let mut all: Vec<f64> = still
-            .flat_map(|(_, seen)| {
-                Kind::ALL.map(|kind| of_kind(seen, kind).into_iter().map(move |d| d / yardsticks[kind as usize]))
-            })
-            .flatten()
-            .collect();
-        !all.is_empty() && median(&mut all) < 2.0 * IMAGE
-    };
-    wrong.joints.iter().copied().find(|&other| other != sample && fits(sample, other) && fits(other, sample))
 }

@@ -21,8 +21,10 @@ mod motion;
 mod numbers;
 mod observation;
 mod outliers;
+mod placed;
 mod poorly;
 mod priors;
+mod reading_noise;
 mod readings;
 mod relearn;
 mod report;
@@ -41,14 +43,21 @@ mod variances;
 mod visual;
 mod weak;
 
+pub(crate) use cameras::with_headers;
 pub use evaluate::{CameraErrors, Distances, Errors, Evaluation, PointErrors, SampleDistances, distances, evaluate};
 pub(crate) use evaluate::{Correspondence, median};
 pub use fitting::Fitting;
 pub use influence::{Influence, most_influential, worst_fitting};
+pub(crate) use observation::Kind;
+pub(crate) use outliers::{is_wrong, yardstick};
+pub(crate) use placed::Placed;
 pub use priors::assumptions;
 pub(crate) use priors::prior_sds;
+pub use reading_noise::ReadingNoise;
 pub use relearn::relearn;
-pub use report::{Calibration, Distance, Finding, Report, StageReport, TipDeviation, camera_deviations};
+pub use report::{
+    Calibration, Distance, Finding, Report, StageReport, TipDeviation, camera_deviations, length_in_words,
+};
 pub use selection::{NoiseTrial, select_noise};
 pub use suggest::{SuggestOptions, SuggestedSample, Suggestion, suggest};
 pub use targets::{Disagreement, TargetReport};

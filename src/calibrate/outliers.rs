@@ -34,10 +34,10 @@ impl Verdict {
 }
 
 /// A detection is wrong beyond this many standard deviations; those between are left to the loss.
-pub(crate) const DETECTION: f64 = 10.0;
+const DETECTION: f64 = 10.0;
 
 /// An image belongs to another pose where its median is beyond this many: less may be a robot that does not repeat itself.
-pub(crate) const IMAGE: f64 = 10.0;
+const IMAGE: f64 = 10.0;
 
 /// Detections that an image must have to be judged as a whole.
 pub(crate) const IN_IMAGE: usize = 3;
@@ -91,7 +91,7 @@ pub(crate) fn judge(setup: &Setup, state: &State, left_out: &[bool], moved: &[bo
             || verdict.moved[seen.camera]
             || wrong_joints.contains(&seen.sample)
             || wrong_images.contains(&image_of(seen));
-        let alone = *distance > DETECTION;
+        let alone = is_wrong(*distance, 1.0);
         verdict.left_out.push(with_others);
         verdict.active[index] = !with_others && !alone;
         single += usize::from(!with_others && alone);
@@ -103,6 +103,38 @@ pub(crate) fn judge(setup: &Setup, state: &State, left_out: &[bool], moved: &[bo
         verdict.findings.push(Finding::Outliers { count: single, of: distances.len() });
     }
     verdict
+}
+
+/// About the standard deviation of a coordinate of one kind of detection: what is stated, or the usual distance where that is larger [px, or m].
+pub(crate) fn yardstick(kind: Kind, stated: f64, distances: &mut [f64]) -> f64 {
+    (median(distances) / kind.median_distance()).max(stated)
+}
+
+/// True for a detection that is wrong by itself.
+pub(crate) fn is_wrong(distance: f64, yardstick: f64) -> bool {
+    distance > DETECTION * yardstick
+}
+
+/// Images of a sample.
+pub(crate) fn images_of(medians: &BTreeMap<Image, f64>, sample: usize) -> impl Iterator<Item = (&Image, &f64)> {
+    medians.range((sample, 0, Kind::Pixels)..=(sample, usize::MAX, Kind::Points))
+}
+
+/// The other of two samples whose readings were swapped, among the first that are wrong. `fits(images, read)`: whether the images of one fit what
+/// was read in another.
+pub(crate) fn swapped_with(
+    wrong: &BTreeSet<usize>,
+    sample: usize,
+    fits: impl Fn(usize, usize) -> bool,
+) -> Option<usize> {
+    let mut among = wrong.iter().copied().take(SWAPPED);
+    let is_among = among.clone().any(|one| one == sample);
+    among.find(|&other| is_among && other != sample && fits(sample, other) && fits(other, sample))
+}
+
+/// True where the distances of a sample from what another's readings predict are small [yardsticks].
+pub(crate) fn fits_swapped(mut distances: Vec<f64>) -> bool {
+    !distances.is_empty() && median(&mut distances) < 2.0 * IMAGE
 }
 
 /// Samples, images and cameras that do not fit.
@@ -118,12 +150,9 @@ pub(crate) struct Wrong {
 /// Judges images by their median distances [yardsticks]. `judged`: the samples of which something is known; `moved`: cameras that are known to
 /// have moved.
 pub(crate) fn wrong(medians: &BTreeMap<Image, f64>, judged: impl Iterator<Item = usize>, moved: &[bool]) -> Wrong {
-    let of_sample = |sample: usize| {
-        medians.range((sample, 0, Kind::Pixels)..=(sample, usize::MAX, Kind::Points)).map(|(key, _)| *key)
-    };
     let mut found = Wrong { joints: BTreeSet::new(), images: BTreeSet::new(), moved: moved.to_vec() };
     for sample in judged {
-        let images: Vec<Image> = of_sample(sample).filter(|key| !moved[key.1]).collect();
+        let images: Vec<Image> = images_of(medians, sample).map(|(key, _)| *key).filter(|key| !moved[key.1]).collect();
         let wrong: Vec<Image> = images.iter().copied().filter(|key| medians[key] > IMAGE).collect();
         if !wrong.is_empty() && wrong.len() == images.len() {
             found.joints.insert(sample);
@@ -144,10 +173,17 @@ fn yardsticks(setup: &Setup, state: &State, left_out: &[bool], distances: &[f64]
         let all = setup.observations.iter().zip(distances).zip(left_out);
         let used = all.filter(|((seen, _), out)| seen.kind() == kind && !**out && state.placed[seen.sample]);
         let mut counted: Vec<f64> = used.map(|((_, distance), _)| *distance).collect();
-        (median(&mut counted) / kind.median_distance()).max(setup.sd(kind))
+        yardstick(kind, setup.sd(kind), &mut counted)
     };
     let both = Kind::ALL.map(of_kind);
     move |kind| both[kind as usize]
+}
+
+/// True where too many are wrong for mistakes: many of all, or all from some on, or all up to one.
+fn is_change(wrong: &[bool]) -> bool {
+    let count = wrong.iter().filter(|wrong| **wrong).count();
+    let at_one_end = wrong[..count].iter().all(|wrong| *wrong) || wrong[wrong.len() - count..].iter().all(|w| *w);
+    count >= BUMPED && (at_one_end || count as f64 > MISTAKES * wrong.len() as f64)
 }
 
 /// Cameras with too many wrong images for mistakes: many of all, or all from some sample on, or all up to one.
@@ -160,10 +196,8 @@ fn bumped_cameras(moved: &[bool], medians: &BTreeMap<Image, f64>, wrong_images: 
             *by_sample.entry(key.0).or_default() |= wrong_images.contains(key);
         }
         let wrong: Vec<bool> = by_sample.into_values().collect();
-        let count = wrong.iter().filter(|wrong| **wrong).count();
-        let at_one_end = wrong[..count].iter().all(|wrong| *wrong) || wrong[wrong.len() - count..].iter().all(|w| *w);
         let others = moved.iter().filter(|moved| !**moved).count() - bumped.len();
-        if others > 1 && count >= BUMPED && (at_one_end || count as f64 > MISTAKES * wrong.len() as f64) {
+        if others > 1 && is_change(&wrong) {
             bumped.push(camera);
         }
     }
@@ -220,15 +254,11 @@ fn report(
     let moved = &verdict.moved;
     let mut findings = Vec::new();
     for &sample in wrong_joints {
-        // Both ways round.
-        let fits = |other: &&usize| {
-            let fits = |of: usize, joints: usize| {
-                median_with_joints_of(setup, state, moved, yardsticks, of, joints) < 2.0 * IMAGE
-            };
-            **other != sample && fits(sample, **other) && fits(**other, sample)
+        let fits = |of: usize, joints: usize| {
+            fits_swapped(distances_with_joints_of(setup, state, moved, yardsticks, of, joints))
         };
         let off = usual_distance(setup, state, sample, |seen| !moved[seen.camera]);
-        let swapped_with = wrong_joints.iter().take(SWAPPED).find(fits).map(|&other| name(other));
+        let swapped_with = swapped_with(wrong_joints, sample, fits).map(name);
         let by_pose = !setup.states.chain;
         findings.push(Finding::WrongJoints { sample: name(sample), off, swapped_with, by_pose });
     }
@@ -253,18 +283,38 @@ fn report(
     verdict.findings.extend(findings);
 }
 
-/// Median distance of what a sample's images show from what another sample's joints predict [yardsticks].
-fn median_with_joints_of(
+/// Distances of what a sample's images show from what another sample's joints predict [yardsticks].
+fn distances_with_joints_of(
     setup: &Setup,
     state: &State,
     moved: &[bool],
     yardsticks: &impl Fn(Kind) -> f64,
     sample: usize,
     joints: usize,
-) -> f64 {
+) -> Vec<f64> {
     let links = state.links(setup, joints);
-    let of_sample = setup.observations.iter().filter(|seen| seen.sample == sample && !moved[seen.camera]);
+    let of_sample = setup.of_sample(sample).iter().filter(|seen| !moved[seen.camera]);
     let distance = |seen: &Observation| seen.error(&state.model, &links).norm() / yardsticks(seen.kind());
-    let mut distances: Vec<f64> = of_sample.map(distance).collect();
-    if distances.is_empty() { f64::INFINITY } else { median(&mut distances) }
+    of_sample.map(distance).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::Cell;
+
+    #[test]
+    fn swapped_pairs_are_found_among_few_and_the_search_stays_short_among_many() {
+        let swapped = |a: usize, b: usize| (a, b) == (3, 8) || (a, b) == (8, 3);
+        let few = BTreeSet::from([1, 3, 8]);
+        assert_eq!([1, 3, 8].map(|sample| swapped_with(&few, sample, swapped)), [None, Some(8), Some(3)]);
+        let (many, tried) = ((0..10_000).collect(), Cell::new(0));
+        for &sample in &many {
+            swapped_with(&many, sample, |_, _| {
+                tried.set(tried.get() + 1);
+                false
+            });
+        }
+        assert!(tried.get() <= SWAPPED * SWAPPED, "{}", tried.get());
+    }
 }

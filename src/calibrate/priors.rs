@@ -1,8 +1,11 @@
 //! What is known before anything is learned, as standard deviations around given values.
-use super::deviations::coordinate_of;
+use super::cameras::{KnownIntrinsics, with_headers};
+use super::deviations::{coordinate_of, intrinsics_of};
 use super::graph::{Priors, row};
 use super::setup::Setup;
-use crate::rig::{CameraField, JointField, Parameter, Parent, Rig};
+use crate::recording::Recording;
+use crate::rig::{CameraField, JointField, Parameter, Parent, Rig, matches};
+use std::collections::BTreeSet;
 
 /// Where a value is given and nothing is said of how well, it is weakly known: so far off a value from a data sheet or an
 /// earlier calibration may well be.
@@ -33,37 +36,26 @@ impl Priors {
         // Given places on the tip or a link mean nothing against the frames of an unknown chain; their distances do.
         let floats = |parent: Parent| parent != Parent::World && !setup.chain_is_known();
         for parameter in rig.parameters() {
-            let stated = rig.prior_sd(&parameter);
-            // A stated prior needs a value to be around; intrinsics always have one.
-            let given = rig.has_value(&parameter);
-            let sd = |default: f64| if given { stated.unwrap_or(default) } else { f64::INFINITY };
+            let known = match parameter {
+                Parameter::CameraField { camera, .. } => setup.intrinsics[camera],
+                // A prior, stated or not, needs a value to be around; intrinsics always have one.
+                _ if !rig.has_value(&parameter) => continue,
+                _ => KNOWN,
+            };
+            let sds = sds(rig, &parameter, known);
+            let [sd, ..] = sds[..] else { continue };
             match parameter {
-                Parameter::Base => priors.base = pose(sd(ANGLE), sd(LENGTH)),
-                Parameter::JointField { joint, field } => {
-                    let is_length = matches!(field, JointField::D | JointField::A);
-                    priors.parameters[row(joint) + coordinate_of(field)] = sd(if is_length { LENGTH } else { ANGLE });
-                }
+                Parameter::Base => priors.base = rotation_first(&sds),
+                Parameter::JointField { joint, field } => priors.parameters[row(joint) + coordinate_of(field)] = sd,
                 Parameter::CameraPose(camera) if !floats(rig.cameras[camera].parent) => {
-                    priors.cameras[camera] = pose(sd(CAMERA_ANGLE), sd(CAMERA_LENGTH));
+                    priors.cameras[camera] = rotation_first(&sds);
                 }
                 Parameter::CameraField { camera, field } => {
-                    let known = setup.intrinsics[camera];
-                    let k = &model.cameras[camera].intrinsics;
-                    let side = rig.cameras[camera].size.map_or(2.0 * k[2].max(k[3]), |[w, h]| f64::from(w.max(h)));
-                    let focal = if known.focal { FOCAL } else { GUESSED_FOCAL };
-                    let centre = if known.centre { CENTRE } else { GUESSED_CENTRE };
-                    let distortion = if known.distortion { DISTORTION } else { GUESSED_DISTORTION };
-                    let sigmas = &mut priors.intrinsics[camera];
-                    match field {
-                        CameraField::Fx => sigmas[0] = stated.unwrap_or(focal * k[0]),
-                        CameraField::Fy => sigmas[1] = stated.unwrap_or(focal * k[1]),
-                        CameraField::Cx => sigmas[2] = stated.unwrap_or(centre * side),
-                        CameraField::Cy => sigmas[3] = stated.unwrap_or(centre * side),
-                        CameraField::Distortion => sigmas[4..].fill(stated.unwrap_or(distortion)),
-                    }
+                    let coefficients = model.cameras[camera].intrinsics.len() - 4;
+                    priors.intrinsics[camera][intrinsics_of(field, coefficients)].fill(sd);
                 }
                 Parameter::FeatureXyz(feature) if !floats(rig.features[feature].parent) => {
-                    priors.features[feature] = [sd(LENGTH); 3];
+                    priors.features[feature] = [sd; 3];
                 }
                 Parameter::CameraPose(_) | Parameter::FeatureXyz(_) | Parameter::TargetPose(_) => {}
             }
@@ -72,42 +64,78 @@ impl Priors {
     }
 }
 
-/// What is assumed of the values that a rig gives, in words: how far off they may be, by default or as its `[estimate.prior]` says.
-pub fn assumptions(rig: &Rig) -> Vec<String> {
-    let mut counts = [0; 4];
-    for parameter in rig.parameters() {
-        let is_assumed = rig.has_value(&parameter) && !rig.is_fixed(&parameter) && rig.prior_sd(&parameter).is_none();
-        let kind = match parameter {
-            Parameter::JointField { field: JointField::D | JointField::A, .. } => 0,
-            Parameter::JointField { .. } => 1,
-            Parameter::CameraPose(_) => 2,
-            Parameter::FeatureXyz(_) => 3,
-            Parameter::Base | Parameter::CameraField { .. } | Parameter::TargetPose(_) => continue,
-        };
-        counts[kind] += usize::from(is_assumed);
-    }
+/// What is assumed of the values that a rig and a recording's header give, in words: how far off they may be, by default or as `[estimate.prior]` of
+/// the rig says.
+pub fn assumptions(rig: &Rig, recording: &Recording) -> Vec<String> {
+    let rig = &with_headers(rig, recording);
     let mm = |length: f64| format!("±{:.0} mm", 1e3 * length);
-    let sds = [
-        (mm(LENGTH), "lengths of joints"),
-        (format!("±{ANGLE} rad"), "angles of joints"),
-        (format!("{} and ±{CAMERA_ANGLE} rad", mm(CAMERA_LENGTH)), "poses of cameras"),
-        (mm(LENGTH), "places of features"),
+    let share = |share: f64| format!("±{:.0} %", 1e2 * share);
+    // What they are called, one by one, with the default.
+    let mut kinds = [
+        ("pose of the base", format!("{} and ±{ANGLE} rad", mm(LENGTH)), 0),
+        ("lengths of joints", mm(LENGTH), 0),
+        ("angles of joints", format!("±{ANGLE} rad"), 0),
+        ("poses of cameras", format!("{} and ±{CAMERA_ANGLE} rad", mm(CAMERA_LENGTH)), 0),
+        ("focal lengths", share(FOCAL), 0),
+        ("coordinates of image centres", format!("{} of the image", share(CENTRE)), 0),
+        ("distortions of lenses", format!("±{DISTORTION} a coefficient"), 0),
+        ("places of features", mm(LENGTH), 0),
     ];
-    let defaults = sds.into_iter().zip(counts).filter(|(_, count)| *count > 0);
-    let defaults = defaults.map(|((sd, what), count)| format!("{sd} on each of the {count} {what} that the rig gives"));
-    let stated = rig.estimate.prior.iter().map(|(path, sd)| format!("±{sd} on {path} as the rig states"));
+    for parameter in rig.parameters() {
+        let kind = match parameter {
+            Parameter::Base => 0,
+            Parameter::JointField { field: JointField::D | JointField::A, .. } => 1,
+            Parameter::JointField { .. } => 2,
+            Parameter::CameraPose(_) => 3,
+            Parameter::CameraField { field: CameraField::Fx | CameraField::Fy, .. } => 4,
+            Parameter::CameraField { field: CameraField::Cx | CameraField::Cy, .. } => 5,
+            Parameter::CameraField { .. } => 6,
+            Parameter::FeatureXyz(_) => 7,
+            Parameter::TargetPose(_) => continue,
+        };
+        let is_assumed = rig.has_value(&parameter) && !rig.is_fixed(&parameter) && rig.prior_sd(&parameter).is_none();
+        kinds[kind].2 += usize::from(is_assumed);
+    }
+    let defaults = kinds.into_iter().filter(|(.., count)| *count > 0).map(|(what, sd, count)| match what {
+        "pose of the base" => format!("{sd} on the {what}"),
+        _ => format!("{sd} on each of the {count} {what}"),
+    });
+    let stated =
+        rig.estimate.prior.iter().map(|(path, sd)| format!("±{sd}{} on {path} as the rig states", units(rig, path)));
     defaults.chain(stated).collect()
+}
+
+/// The units of what a path covers, such as " m and rad"; nothing where it has none.
+fn units(rig: &Rig, pattern: &str) -> String {
+    let unit = |parameter: &Parameter| -> &[&str] {
+        match parameter {
+            Parameter::Base | Parameter::CameraPose(_) | Parameter::TargetPose(_) => &["m", "rad"],
+            Parameter::JointField { field: JointField::D | JointField::A, .. } | Parameter::FeatureXyz(_) => &["m"],
+            Parameter::JointField { .. } => &["rad"],
+            Parameter::CameraField { field: CameraField::Distortion, .. } => &[],
+            Parameter::CameraField { .. } => &["px"],
+        }
+    };
+    let covered = rig.parameters().into_iter().filter(|parameter| matches(pattern, &parameter.path(rig)));
+    let units: BTreeSet<&str> = covered.flat_map(|parameter| unit(&parameter).to_vec()).collect();
+    let words = units.into_iter().collect::<Vec<_>>().join(" and ");
+    if words.is_empty() { words } else { format!(" {words}") }
 }
 
 /// The standard deviations of the prior around a parameter that has a value in a rig, number by number in the order of `[fit.sd]`; `None` where
 /// it has none. A lens is taken as the rig has it, so that one from a recording's header has to be filled in.
 pub(crate) fn prior_sds(rig: &Rig, parameter: &Parameter) -> Option<Vec<f64>> {
-    if !rig.has_value(parameter) {
-        return None;
-    }
+    rig.has_value(parameter).then(|| sds(rig, parameter, KNOWN)).filter(|sds| !sds.is_empty())
+}
+
+/// Of intrinsics that somebody gave.
+const KNOWN: KnownIntrinsics = KnownIntrinsics { focal: true, centre: true, distortion: true, unused: false };
+
+/// The same around whatever value there is; of intrinsics as they are known. Of a target, nothing is said.
+fn sds(rig: &Rig, parameter: &Parameter, known: KnownIntrinsics) -> Vec<f64> {
     let sd = |default: f64| rig.prior_sd(parameter).unwrap_or(default);
     let pose = |length: f64, angle: f64| [[sd(length); 3], [sd(angle); 3]].concat();
-    Some(match *parameter {
+    match *parameter {
         Parameter::Base => pose(LENGTH, ANGLE),
         Parameter::JointField { field: JointField::D | JointField::A, .. } => vec![sd(LENGTH)],
         Parameter::JointField { .. } => vec![sd(ANGLE)],
@@ -115,20 +143,23 @@ pub(crate) fn prior_sds(rig: &Rig, parameter: &Parameter) -> Option<Vec<f64>> {
         Parameter::FeatureXyz(_) => vec![sd(LENGTH); 3],
         Parameter::CameraField { camera, field } => {
             let camera = &rig.cameras[camera];
+            let focal = if known.focal { FOCAL } else { GUESSED_FOCAL };
+            let centre = if known.centre { CENTRE } else { GUESSED_CENTRE };
+            let distortion = if known.distortion { DISTORTION } else { GUESSED_DISTORTION };
+            let twice_centre = 2.0 * camera.cx.unwrap_or(0.0).max(camera.cy.unwrap_or(0.0));
+            let side = camera.size.map_or(twice_centre, |[w, h]| f64::from(w.max(h)));
             match field {
-                CameraField::Fx => vec![sd(FOCAL * camera.fx?)],
-                CameraField::Fy => vec![sd(FOCAL * camera.fy?)],
-                CameraField::Cx | CameraField::Cy => {
-                    let side = camera.size.map_or(2.0 * camera.cx?.max(camera.cy?), |[w, h]| f64::from(w.max(h)));
-                    vec![sd(CENTRE * side)]
-                }
-                CameraField::Distortion => vec![sd(DISTORTION); camera.distortion.as_ref()?.len()],
+                CameraField::Fx => vec![sd(focal * camera.fx.unwrap_or(0.0))],
+                CameraField::Fy => vec![sd(focal * camera.fy.unwrap_or(0.0))],
+                CameraField::Cx | CameraField::Cy => vec![sd(centre * side)],
+                CameraField::Distortion => vec![sd(distortion); camera.distortion.as_ref().map_or(1, Vec::len)],
             }
         }
-        Parameter::TargetPose(_) => return None,
-    })
+        Parameter::TargetPose(_) => Vec::new(),
+    }
 }
 
-fn pose(angle: f64, length: f64) -> [f64; 6] {
-    [angle, angle, angle, length, length, length]
+/// Of a pose as [`Priors`] has it.
+fn rotation_first(sds: &[f64]) -> [f64; 6] {
+    std::array::from_fn(|index| sds[(index + 3) % 6])
 }

@@ -34,6 +34,8 @@ pub struct Report {
     pub stages: Vec<StageReport>,
     /// True where the last stage reached a minimum.
     pub converged: bool,
+    /// True where lengths are metres; false where nothing metric is known, and they are in the model's unit.
+    pub metric: bool,
     /// What the data cannot determine, in words, and how it was fixed.
     pub gauge: Vec<String>,
     /// Where the robot's state is known from: which readings and actions take part, and how well they are known.
@@ -133,54 +135,65 @@ pub enum Finding {
     },
 }
 
-impl std::fmt::Display for Finding {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl Finding {
+    /// In words, where a rig is judged and nothing is learned: what does not fit, and nothing of its being left out.
+    pub fn of_evaluation(&self) -> String {
         match self {
-            Finding::UnseenCamera { camera } => write!(f, "camera `{camera}` saw nothing and was left out"),
-            Finding::Misfit { ratio, stated } => write!(
-                f,
-                "errors are {ratio:.1} times the stated noise of {stated}: the noise is larger, a lens model or a joint's kind \
-                 is wrong, or the fit went astray"
+            Finding::UnseenCamera { camera } => format!("camera `{camera}` saw nothing"),
+            Finding::Misfit { ratio, stated } => format!(
+                "errors are {ratio:.1} times the stated noise of {}: the noise is larger, a lens model or a joint's kind is wrong, or the fit \
+                 went astray",
+                stated.rounded()
             ),
-            Finding::MissedLength { length, learned } => write!(
-                f,
+Finding::MissedLength { length, learned } => format!(
                 "{} was measured as {:.2} mm and is {:.2} mm in the learned rig: one of it and the other known lengths is wrong",
                 length.between,
                 1e3 * length.length,
                 1e3 * learned
             ),
-            Finding::Outliers { count, of } => write!(f, "{count} of {of} detections do not fit and were left out"),
+            Finding::Outliers { count, of } => format!("{count} of {of} detections do not fit"),
             Finding::WrongJoints { sample, off, swapped_with, by_pose } => {
                 let (leads, fits) = if *by_pose { ("tip pose does", "it fits") } else { ("joints do", "they fit") };
-                write!(f, "sample {sample}: its {leads} not lead to what the cameras saw ({off:.1})")?;
-                match swapped_with {
-                    Some(other) => write!(
-                        f,
-                        "; {fits} the images of sample {other}: the two are swapped, and both were left out (nothing has to be mended; to use \
-                         them, exchange what was read in them)"
-                    ),
-                    None => write!(f, "; it was left out"),
-                }
+                let swapped =
+                    swapped_with.map(|other| format!("; {fits} the images of sample {other}: the two are swapped"));
+                let swapped = swapped.unwrap_or_default();
+                format!("sample {sample}: its {leads} not lead to what the cameras saw ({off:.1}){swapped}")
             }
             Finding::UnknownState { sample } => {
-                write!(
-                    f,
-                    "sample {sample}: nothing was read of the robot's state, and its images do not determine it; it was left out"
-                )
+                format!("sample {sample}: nothing was read of the robot's state, and its images do not determine it")
             }
             Finding::WrongImage { sample, camera, off } => {
-                write!(
-                    f,
-                    "sample {sample}: the image of camera `{camera}` belongs to another pose ({off:.1}); it was left out"
-                )
+                format!("sample {sample}: the image of camera `{camera}` belongs to another pose ({off:.1})")
             }
             Finding::CameraMoved { camera, largest, sample } => {
-                write!(
-                    f,
-                    "camera `{camera}` moved during the recording: sample {sample} is {largest:.1} off; its images were \
-                     left out of the fit of all else"
-                )
+                format!("camera `{camera}` is not where the rig has it: sample {sample} is {largest:.1} off")
             }
+        }
+    }
+}
+
+/// Where a rig was learned: with what was left out.
+impl std::fmt::Display for Finding {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let words = self.of_evaluation();
+        match self {
+            Finding::Misfit { .. } | Finding::MissedLength { .. } => f.write_str(&words),
+            Finding::UnseenCamera { .. } | Finding::Outliers { .. } => {
+                let verb = if matches!(self, Finding::UnseenCamera { .. }) { "was" } else { "were" };
+                write!(f, "{words} and {verb} left out")
+            }
+            Finding::WrongJoints { swapped_with: Some(_), .. } => write!(
+                f,
+                "{words}, and both were left out (nothing has to be mended; to use them, exchange what was read in them)"
+            ),
+            Finding::WrongJoints { .. } | Finding::UnknownState { .. } | Finding::WrongImage { .. } => {
+                write!(f, "{words}; it was left out")
+            }
+            Finding::CameraMoved { camera, largest, sample } => write!(
+                f,
+                "camera `{camera}` moved during the recording: sample {sample} is {largest:.1} off; its images were left out of the fit of all \
+                 else"
+            ),
         }
     }
 }
@@ -194,13 +207,28 @@ pub enum Distance {
     Metres(f64),
 }
 
+impl Distance {
+    fn with_unit(&self) -> (f64, &'static str) {
+        match self {
+            Distance::Pixels(px) => (*px, "px"),
+            Distance::Metres(m) => (1e3 * m, "mm"),
+        }
+    }
+
+    /// With its unit, to three digits that count and no zeros behind them.
+    pub fn rounded(&self) -> String {
+        let (value, unit) = self.with_unit();
+        let decimals = if value == 0.0 { 0 } else { (2.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize };
+        let digits = format!("{value:.decimals$}");
+        let digits = if decimals > 0 { digits.trim_end_matches('0').trim_end_matches('.') } else { &digits };
+        format!("{digits} {unit}")
+    }
+}
+
 /// With its unit; points in mm. A precision is that of the number.
 impl std::fmt::Display for Distance {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (value, unit) = match self {
-            Distance::Pixels(px) => (*px, "px"),
-            Distance::Metres(m) => (1e3 * m, "mm"),
-        };
+        let (value, unit) = self.with_unit();
         value.fmt(f)?;
         write!(f, " {unit}")
     }
@@ -230,7 +258,7 @@ impl TipDeviation {
 
     /// A length of the tip with its unit.
     pub fn length(&self, length: f64) -> String {
-        if self.metric { format!("{:.3} mm", 1e3 * length) } else { format!("{length:.2e}") }
+        length_in_words(length, self.metric)
     }
 }
 
@@ -245,23 +273,30 @@ impl std::fmt::Display for TipDeviation {
         }
         write!(f, "{})", if self.metric { "" } else { "; nothing metric is known, so in the model's unit" })?;
         if self.hangs_on_priors() {
-            write!(f, "; they differ because what pixels do not tell, above all the scale, comes only from what was ")?;
-            write!(f, "assumed of the rig")?;
+            write!(f, "; they differ because what the data do not tell comes only from what was assumed of the rig")?;
         }
         Ok(())
     }
 }
 
+/// A length with its unit, or as a bare number where nothing metric is known.
+pub fn length_in_words(length: f64, metric: bool) -> String {
+    if metric { format!("{:.3} mm", 1e3 * length) } else { format!("{length:.2e}") }
+}
+
 /// How well the pose of every camera is known, with what priors say of it, in words; nothing of those whose poses are held or left open.
-pub fn camera_deviations(learned: &Rig) -> Vec<String> {
+pub fn camera_deviations(calibration: &Calibration) -> Vec<String> {
+    let Calibration { rig: learned, report } = calibration;
+    let unit = if report.metric { "" } else { ", in the model's unit" };
     let of_camera = |camera: &Camera| {
         let sd = learned.fit.as_ref()?.sd.get(&format!("cameras.{}.pose", camera.name))?;
         let [x, y, z, turns @ ..] = sd.as_slice() else { return None };
         let turn = turns.iter().map(|sd| sd * sd).sum::<f64>().sqrt();
-        let [mm, deg] = [1e3 * (x * x + y * y + z * z).sqrt(), turn.to_degrees()];
+        let length = length_in_words((x * x + y * y + z * z).sqrt(), report.metric);
         Some(format!(
-            "the pose of camera `{}` is known to {mm:.3} mm and {deg:.3}° (standard deviation, with the priors)",
-            camera.name
+            "the pose of camera `{}` is known to {length} and {:.3}° (standard deviation, with the priors{unit})",
+            camera.name,
+            turn.to_degrees()
         ))
     };
     learned.cameras.iter().filter_map(of_camera).collect()

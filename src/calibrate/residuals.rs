@@ -20,7 +20,7 @@ pub(crate) fn whitened(setup: &Setup, state: &State) -> Vec<f64> {
 pub(crate) fn median_of_sample(setup: &Setup, state: &State, sample: usize) -> Option<f64> {
     let links = state.links(setup, sample);
     let whitened = |seen: &Observation| seen.error(&state.model, &links).norm() / setup.sd(seen.kind());
-    let mut all: Vec<f64> = setup.observations.iter().filter(|seen| seen.sample == sample).map(whitened).collect();
+    let mut all: Vec<f64> = setup.of_sample(sample).iter().map(whitened).collect();
     (!all.is_empty()).then(|| median(&mut all))
 }
 
@@ -33,7 +33,7 @@ pub(crate) fn usual_distance(
 ) -> Distance {
     let links = state.links(setup, sample);
     let of_kind = |kind: Kind| {
-        let chosen = setup.observations.iter().filter(|seen| seen.sample == sample && seen.kind() == kind);
+        let chosen = setup.of_sample(sample).iter().filter(|seen| seen.kind() == kind);
         let distance = |seen: &Observation| seen.error(&state.model, &links).norm();
         let mut all: Vec<f64> = chosen.filter(|seen| is_chosen(seen)).map(distance).collect();
         (!all.is_empty()).then(|| kind.distance(median(&mut all)))

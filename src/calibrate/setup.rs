@@ -120,6 +120,13 @@ impl Setup {
         }
     }
 
+    /// The detections of one sample.
+    pub fn of_sample(&self, sample: usize) -> &[Observation] {
+        let first = self.observations.partition_point(|seen| seen.sample < sample);
+        let end = self.observations.partition_point(|seen| seen.sample <= sample);
+        &self.observations[first..end]
+    }
+
     /// True where some detections are of that kind.
     pub fn has(&self, kind: Kind) -> bool {
         self.observations.iter().any(|seen| seen.kind() == kind)

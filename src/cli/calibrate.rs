@@ -14,6 +14,7 @@ use handeye::calibrate::{
     Calibration, Distance, Errors, Finding, NoiseTrial, Options, Progress, Report, TargetReport, assumptions,
     calibrate, camera_deviations, relearn, select_noise,
 };
+use handeye::recording::Recording;
 use handeye::report;
 use handeye::rig::{Rig, files_named};
 use serde_json::{Value, json};
@@ -112,21 +113,8 @@ impl Calibrate {
         })?;
         drop(bar);
         let output = self.output.display();
-        if let Some(path) = &self.report {
-            let tables = folds.iter().map(Folds::as_table).collect::<Vec<_>>();
-            let subject = report::Subject {
-                title: &output.to_string(),
-                before: &rig,
-                calibration: &calibration,
-                recording: &recording,
-                suggestion: suggestion.as_ref(),
-                tables: &tables,
-            };
-            let page = report::html(&subject)?;
-            write_output(path, &page)?;
-        }
-        let Calibration { rig: learned, report } = calibration;
-        let mut answer = Answer::new(describe(&rig, &learned, &report, seconds), report_json(&report));
+        let Calibration { rig: learned, report } = &calibration;
+        let mut answer = Answer::new(describe(&rig, &recording, &calibration, seconds), report_json(report));
         answer.json["seconds"] = json!(seconds);
         if !trials.is_empty() {
             answer.text += &format!("\n{}", noise::trials_table(&trials));
@@ -139,13 +127,31 @@ impl Calibrate {
         if report.converged {
             learned.write(&self.output, text.as_deref())?;
             answer.json["learned"] = json!(output.to_string());
-            answer.text +=
-                &format!("\nnext: handeye evaluate {output} FRESH.jsonl judges it on samples it has not seen\n");
+            answer.text += &match report.targets {
+                None => format!("\nnext: handeye evaluate {output} FRESH.jsonl judges it on samples it has not seen\n"),
+                Some(_) => "\nnext: learn from a second recording too: the poses of both agree within a few of their standard deviations\n".into(),
+            };
         } else {
             let reason = "no minimum was reached, so what was learned is not to be relied on";
             answer.failure = Some(format!(
                 "{output} was not written: {reason}; more varied motions, or a rig that gives more, would do"
             ));
+        }
+        if let Some(path) = &self.report {
+            let tables = folds.iter().map(Folds::as_table).collect::<Vec<_>>();
+            let subject = report::Subject {
+                title: &output.to_string(),
+                before: &rig,
+                calibration: &calibration,
+                recording: &recording,
+                suggestion: suggestion.as_ref(),
+                tables: &tables,
+            };
+            // What was learned is there whatever becomes of its page.
+            if let Err(error) = report::html(&subject).and_then(|page| write_output(path, &page)) {
+                let reason = format!("the page {} was not written: {error}", path.display());
+                answer.failure.get_or_insert(reason);
+            }
         }
         Ok(answer)
     }
@@ -158,7 +164,8 @@ fn on_threads<T: Send>(threads: Option<u16>, work: impl FnOnce() -> Result<T, Er
     pool.map_err(|error| Error::Unusable(format!("--threads {threads}: {error}")))?.install(work)
 }
 
-fn describe(before: &Rig, learned_rig: &Rig, report: &Report, seconds: f64) -> String {
+fn describe(before: &Rig, recording: &Recording, calibration: &Calibration, seconds: f64) -> String {
+    let Calibration { rig: learned_rig, report } = calibration;
     let (samples, detections) = (count(report.samples, "sample"), count(report.observations, "detection"));
     let learned = learned_in_words(before, learned_rig);
     let mut text = format!("{learned} from {samples} with {detections}, in {}\n\n", duration(seconds));
@@ -172,10 +179,10 @@ fn describe(before: &Rig, learned_rig: &Rig, report: &Report, seconds: f64) -> S
     if let Some(tip) = &report.tip {
         text += &format!("\nthe tip's position is known to {tip}\n");
         if tip.hangs_on_priors() {
-            text += &format!("  what was assumed: {}\n", assumptions(before).join(", "));
+            text += &format!("  what was assumed of what was given: {}\n", assumptions(before, recording).join(", "));
         }
     }
-    let cameras = camera_deviations(learned_rig);
+    let cameras = camera_deviations(calibration);
     if !cameras.is_empty() {
         text += &format!("\n{}\n", cameras.join("\n"));
     }
@@ -270,7 +277,7 @@ pub fn report_json(report: &Report) -> Value {
         "gauge": report.gauge,
         "states": report.states,
         "noise": report.noise.as_ref().map(noise::json),
-        "findings": report.findings.iter().map(finding_json).collect::<Vec<_>>(),
+        "findings": report.findings.iter().map(|one| finding_json(one, one.to_string())).collect::<Vec<_>>(),
         "tip_sd": report.tip.map(|tip| json!({
             "median": tip.median, "largest": tip.largest, "by_data": tip.by_data, "metric": tip.metric
         })),
@@ -284,7 +291,7 @@ pub fn report_json(report: &Report) -> Value {
 }
 
 /// Adds a distance as NAME_px or NAME_mm.
-fn with(mut json: Value, name: &str, distance: &Distance) -> Value {
+pub fn with(mut json: Value, name: &str, distance: &Distance) -> Value {
     match distance {
         Distance::Pixels(px) => json[format!("{name}_px")] = json!(px),
         Distance::Metres(m) => json[format!("{name}_mm")] = json!(1e3 * m),
@@ -292,8 +299,8 @@ fn with(mut json: Value, name: &str, distance: &Distance) -> Value {
     json
 }
 
-/// A finding, with its words.
-pub fn finding_json(finding: &Finding) -> Value {
+/// A finding, with words for it.
+pub fn finding_json(finding: &Finding, words: String) -> Value {
     let mut json = match finding {
         Finding::UnseenCamera { camera } => json!({ "kind": "unseen_camera", "camera": camera }),
         Finding::Misfit { ratio, stated } => with(json!({ "kind": "misfit", "ratio": ratio }), "stated", stated),
@@ -316,6 +323,6 @@ pub fn finding_json(finding: &Finding) -> Value {
             with(json!({ "kind": "camera_moved", "camera": camera, "sample": sample }), "largest", largest)
         }
     };
-    json["text"] = json!(finding.to_string());
+    json["text"] = json!(words);
     json
 }

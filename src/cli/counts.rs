@@ -93,7 +93,7 @@ pub fn learned_in_words(before: &Rig, learned: &Rig) -> String {
         .map(|parameter| parameter.path(before))
         .collect();
     let mut numbers = [[0; 3]; KINDS.len()];
-    for parameter in learned.parameters() {
+    for parameter in learned.parameters().into_iter().filter(|parameter| learned.has_value(parameter)) {
         let what = match (learned.is_fixed(&parameter), given.contains(&parameter.path(learned))) {
             (true, _) => 2,
             (false, true) => 1,

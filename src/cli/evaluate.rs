@@ -1,12 +1,12 @@
 //! `handeye evaluate`: how well a rig predicts a recording.
 use super::answer::Answer;
-use super::calibrate::finding_json;
+use super::calibrate::{finding_json, with};
 use super::inputs::{check_output, read_recordings, read_rig, write_output};
 use super::reading::Reading;
-use super::words::{cameras_json, count, error_table, errors_json};
+use super::words::{cameras_json, count, error_table, errors_json, list, mm, px};
 use clap::Args;
 use handeye::Error;
-use handeye::calibrate::{Evaluation, evaluate};
+use handeye::calibrate::{Distance, Evaluation, ReadingNoise, evaluate};
 use handeye::report::{evaluation_html, evaluation_steps};
 use handeye::rig::Rig;
 use serde_json::{Value, json};
@@ -64,10 +64,15 @@ pub fn json(evaluation: &Evaluation) -> Value {
         let medians = evaluation.sample_median_m.iter().map(|median| median.map(|m| 1e3 * m));
         object.insert("sample_median_mm".to_owned(), medians.collect());
     }
+    let (of_readings, _) = &evaluation.reading_noise;
+    object.insert("reading_noise".to_owned(), json!({ "rms_px": of_readings.px, "rms_mm": 1e3 * of_readings.m }));
+    let poor = evaluation.fitting.poor.iter().map(|(sample, off)| with(json!({ "sample": sample }), "median", off));
+    object.insert("fit_worst".to_owned(), poor.collect());
     let mut fitting = errors_json(&evaluation.fitting.total);
     fitting.insert("cameras".to_owned(), cameras_json(&evaluation.fitting.cameras));
     object.insert("without_what_does_not_fit".to_owned(), Value::Object(fitting));
-    object.insert("findings".to_owned(), evaluation.fitting.findings.iter().map(finding_json).collect());
+    let findings = evaluation.fitting.findings.iter();
+    object.insert("findings".to_owned(), findings.map(|one| finding_json(one, one.of_evaluation())).collect());
     Value::Object(object)
 }
 
@@ -77,9 +82,18 @@ fn text(rig: &Rig, evaluation: &Evaluation) -> String {
     text += &error_table(cameras, total, *rejected).to_string();
     if *rejected > 0 {
         text += &format!(
-            "\n{} left out: the rig does not know the camera or feature, or the sample has neither joints nor a tip pose\n",
+            "\n{} left out: the rig does not know the camera or feature, or it does not follow from joints or a tip pose\n",
             count(*rejected, "detection")
         );
+    }
+    let (of_readings, _) = &evaluation.reading_noise;
+    if *of_readings != ReadingNoise::default() {
+        let parts = [
+            (of_readings.px, format!("{} px", px(of_readings.px))),
+            (of_readings.m, format!("{} mm", mm(of_readings.m))),
+        ];
+        let parts: Vec<String> = parts.into_iter().filter(|(size, _)| *size > 0.0).map(|(_, words)| words).collect();
+        text += &format!("\nnoise of what was read of the robot gives {} rms of this alone\n", parts.join(" and "));
     }
     if total.behind > 0 {
         text += &format!("\n{} predicted behind the camera\n", count(total.behind, "detection"));
@@ -89,7 +103,14 @@ fn text(rig: &Rig, evaluation: &Evaluation) -> String {
         text += "\nwithout what does not fit, as calibrate leaves it out:\n\n";
         text += &error_table(&fitting.cameras, &fitting.total, left_out).to_string();
         text += "\nwhat does not fit:\n";
-        fitting.findings.iter().for_each(|finding| text += &format!("  {finding}\n"));
+        fitting.findings.iter().for_each(|finding| text += &format!("  {}\n", finding.of_evaluation()));
+    }
+    if !fitting.poor.is_empty() {
+        let one = |(sample, off): &(usize, Distance)| format!("sample {sample} ({off:.1})");
+        text += &format!(
+            "\nfit worst, far beyond what is usual here in the median: {}\n",
+            list(&fitting.poor.iter().map(one).collect::<Vec<_>>())
+        );
     }
     text + &format!("\nnext: {}\n", evaluation_steps(rig, evaluation).join("\n      "))
 }

@@ -6,7 +6,7 @@ use super::table::Table;
 use super::words::count;
 use clap::Args;
 use handeye::Error;
-use handeye::calibrate::{SuggestOptions, SuggestedSample, Suggestion, suggest};
+use handeye::calibrate::{SuggestOptions, SuggestedSample, Suggestion, length_in_words, suggest};
 use handeye::chain::JointKind;
 use handeye::recording::{RecordedCamera, Recording, Sample};
 use handeye::rig::{Camera, Rig};
@@ -106,8 +106,7 @@ fn text(rig: &Rig, suggestion: &Suggestion) -> String {
         let values = sample.joints.iter().copied().zip(joints.iter().map(|joint| joint.kind)).map(reading);
         positions.row([(number + 1).to_string()].into_iter().chain(values).chain([sample.in_view.to_string()]));
     }
-    let length =
-        |length: f64| if suggestion.metric { format!("{:.3} mm", 1e3 * length) } else { format!("{length:.2e}") };
+    let length = |length: f64| length_in_words(length, suggestion.metric);
     let mut bought = Table::new(&["positions added", "tip known to", "as many random ones"]);
     bought.row(["0".to_owned(), length(suggestion.now), length(suggestion.now)]);
     for (number, sample) in suggestion.samples.iter().enumerate() {

@@ -1,7 +1,9 @@
 //! How much of a calibration to trust, for people and for programs.
 use super::table::Table;
 use super::words::{mm, px};
-use handeye::calibrate::{Combination, DeterminedBy, Influence, Report, most_influential, worst_fitting};
+use handeye::calibrate::{
+    Combination, DeterminedBy, Influence, Report, length_in_words, most_influential, worst_fitting,
+};
 use serde_json::{Value, json};
 
 /// Samples that are listed.
@@ -12,7 +14,6 @@ pub fn text(report: &Report) -> String {
     if report.influence.is_empty() {
         return String::new();
     }
-    let is_metric = report.tip.is_some_and(|tip| tip.metric);
     let has_points = report.points.observations > 0;
     let mut text = String::new();
     for (title, samples) in [
@@ -27,8 +28,7 @@ pub fn text(report: &Report) -> String {
         for Influence { sample, tip, rms_px, rms_points_m, .. } in samples {
             let tip = match tip {
                 Some(tip) if !tip.is_finite() => "nothing holds it".to_owned(),
-                Some(tip) if is_metric => format!("{:.4} mm", 1e3 * tip),
-                Some(tip) => format!("{tip:.2e}"),
+                Some(tip) => length_in_words(tip, report.metric),
                 None => "-".to_owned(),
             };
             let row = [sample.to_string(), tip, px(rms_px)].into_iter();

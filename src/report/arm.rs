@@ -1,9 +1,9 @@
 //! The view that can be turned: arm, cameras and features, where the rig puts them.
 use super::page::Page;
-use super::residuals::{Placed, is_inner};
 use crate::Error;
+use crate::calibrate::Placed;
 use crate::recording::Recording;
-use crate::rig::{Model, Parent, Rig};
+use crate::rig::{Camera, Feature, Joint, Model, Parent, Rig, Target};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
 use serde_json::{Value, json};
@@ -30,16 +30,17 @@ pub(super) fn thinned(count: usize) -> usize {
 
 /// Draws the arm in some samples, the tip in all.
 pub(super) fn view(page: &mut Page, rig: &Rig, recording: &Recording, shown: Shown<'_>) -> Result<(), Error> {
+    let rig = &drawn(rig);
     let model = Model::new(rig)?;
     let samples = &recording.samples;
     let of_sample = |sample: &crate::recording::Sample| {
         let joints = sample.joints.as_ref().filter(|joints| joints.len() == model.chain.len() && !joints.is_empty());
-        let placed = joints.map(|joints| Placed { links: model.links(joints), is_tip_alone: false });
+        let placed = joints.map(|joints| Placed::by_joints(&model, joints));
         placed.or_else(|| sample.pose.map(|pose| Placed::by_tip(&model, pose)))
     };
     let mut states: Vec<Placed> = samples.iter().filter_map(of_sample).collect();
     if states.is_empty() {
-        states.push(Placed { links: model.links(&vec![0.0; model.chain.len()]), is_tip_alone: false });
+        states.push(Placed::by_joints(&model, &vec![0.0; model.chain.len()]));
     }
     let spread = |most: usize| (0..states.len()).step_by(states.len().div_ceil(most).max(1));
     let arms: Vec<usize> = match shown {
@@ -47,7 +48,7 @@ pub(super) fn view(page: &mut Page, rig: &Rig, recording: &Recording, shown: Sho
         Shown::Each(_) => (0..states.len()).step_by(thinned(states.len())).collect(),
     };
     let tip = |placed: &Placed| placed.links[placed.links.len() - 1].translation;
-    let is_placed = |parent: Parent| !(states[0].is_tip_alone && is_inner(parent, &model));
+    let is_placed = |parent: Parent| states[0].knows(&model, parent);
     let features = |index: usize| -> Vec<Vector3<f64>> {
         if let Shown::Each(given) = shown {
             return given.get(index).map_or(Vec::new(), |features| features.to_vec());
@@ -105,6 +106,29 @@ pub(super) fn view(page: &mut Page, rig: &Rig, recording: &Recording, shown: Sho
         },
     );
     Ok(())
+}
+
+/// What of a rig can be drawn: its targets as features, a camera whatever its lens, and an arm where its rows are known.
+fn drawn(rig: &Rig) -> Rig {
+    let mut drawn = rig.clone();
+    let is_known = |joint: &Joint| [joint.offset, joint.d, joint.a, joint.alpha].iter().all(Option::is_some);
+    if !drawn.robot.joints.iter().all(is_known) {
+        drawn.robot.joints.clear();
+    }
+    let targets = rig.targets.iter().filter_map(|target| {
+        let Target { name, parent, pose } = target.clone();
+        Some(Feature { name, parent, xyz: Some(pose?.translation.into()) })
+    });
+    drawn.features.extend(targets);
+    let has_arm = !drawn.robot.joints.is_empty();
+    let is_placed = |parent: Parent| has_arm || !matches!(parent, Parent::Link(_));
+    drawn.features.retain(|feature| feature.xyz.is_some() && is_placed(feature.parent));
+    drawn.cameras.retain(|camera| camera.pose.is_some() && is_placed(camera.parent));
+    let has_no_lens = |camera: &&mut Camera| [camera.fx, camera.fy, camera.cx, camera.cy].iter().any(Option::is_none);
+    for camera in drawn.cameras.iter_mut().filter(has_no_lens) {
+        *camera = Camera { depth: true, fx: None, fy: None, cx: None, cy: None, ..camera.clone() };
+    }
+    drawn
 }
 
 /// A camera's centre and its image at a distance.

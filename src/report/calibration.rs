@@ -4,7 +4,8 @@ use super::sections::WORST;
 use super::{arm, combinations, noise, residuals, sections, values, verdict};
 use crate::Error;
 use crate::calibrate::{
-    Calibration, DeterminedBy, Finding, SuggestOptions, SuggestedSample, Suggestion, camera_deviations, suggest,
+    Calibration, DeterminedBy, Finding, SuggestOptions, SuggestedSample, Suggestion, camera_deviations,
+    length_in_words, suggest,
 };
 use crate::recording::Recording;
 use crate::rig::Rig;
@@ -49,15 +50,15 @@ pub fn suggestion(learned: &Rig, recording: &Recording, before: &Rig) -> Option<
 ///
 /// Errors: [`Error::Unusable`] where rig and recording do not fit.
 pub fn html(subject: &Subject<'_>) -> Result<String, Error> {
-    let rig = &subject.calibration.rig;
-    let residuals = residuals(rig, subject.recording)?;
+    let Calibration { rig, report } = subject.calibration;
+    // Where targets were learned from, pixels were not, and lenses may be unknown.
+    let residuals = if report.targets.is_some() { Vec::new() } else { residuals(rig, subject.recording)? };
     let mut page = Page::new(subject.title);
     verdict::section(&mut page, subject, &residuals);
     summary(&mut page, subject);
-    sections::cameras(&mut page, rig, &subject.calibration.report.cameras, &residuals);
-    let report = &subject.calibration.report;
+    sections::cameras(&mut page, rig, &report.cameras, &residuals);
     noise::section(&mut page, rig, &residuals, &report.findings);
-    sections::worst(&mut page, rig, &residuals);
+    sections::worst(&mut page, rig, &residuals, &report.findings);
     sections::coverage(&mut page, rig, subject.recording);
     arm::view(&mut page, rig, subject.recording, arm::Shown::Few)?;
     values::table(&mut page, subject);
@@ -90,7 +91,7 @@ fn summary(page: &mut Page, subject: &Subject<'_>) {
         } else {
             figures.push((tip.length(tip.median), "standard deviation of the tip's position"));
         }
-        if !tip.metric {
+        if !report.metric {
             figures.push(("no unit".to_owned(), "of lengths: nothing metric is known"));
         }
     }
@@ -104,7 +105,7 @@ fn summary(page: &mut Page, subject: &Subject<'_>) {
         page.paragraph("No minimum was reached: what stands below is not to be relied on.");
     }
     page.list(&report.states);
-    page.list(&camera_deviations(&subject.calibration.rig));
+    page.list(&camera_deviations(subject.calibration));
     if report.findings.is_empty() {
         page.paragraph("Nothing in the recording stands out as wrong.");
     } else {
@@ -122,7 +123,6 @@ fn open(page: &mut Page, subject: &Subject<'_>) {
         return;
     }
     page.list(&report.gauge);
-    let metric = report.tip.is_some_and(|tip| tip.metric);
     let row = |combination: &crate::calibrate::Combination| {
         let by = match combination.determined_by {
             DeterminedBy::Nothing => "nothing".to_owned(),
@@ -130,9 +130,7 @@ fn open(page: &mut Page, subject: &Subject<'_>) {
             DeterminedBy::Prior(_) => "its prior alone".to_owned(),
             DeterminedBy::Poorly { .. } => "the data, poorly".to_owned(),
         };
-        let tip = combination.tip.map_or("unbounded".to_owned(), |tip| {
-            if metric { format!("{:.3} mm", 1e3 * tip) } else { format!("{tip:.1e}") }
-        });
+        let tip = combination.tip.map_or("unbounded".to_owned(), |tip| length_in_words(tip, report.metric));
         vec![combinations::together(&subject.calibration.rig, &combination.numbers), by, tip, combination.cure.clone()]
     };
     let rows: Vec<Vec<String>> = report.weak.iter().map(row).collect();
@@ -150,12 +148,10 @@ fn influence(page: &mut Page, subject: &Subject<'_>) {
     }
     most.sort_by(|a, b| b.1.total_cmp(&a.1));
     most.truncate(WORST);
-    let metric = report.tip.is_some_and(|tip| tip.metric);
     page.section("influence", "The samples that matter most");
     page.paragraph("How far the tip would move without each of them.");
     let row = |(sample, tip, rms): &(usize, f64, f64)| {
-        let moved = if metric { format!("{:.4} mm", 1e3 * tip) } else { format!("{tip:.1e}") };
-        vec![sample.to_string(), moved, format!("{rms:.3}")]
+        vec![sample.to_string(), length_in_words(*tip, report.metric), format!("{rms:.3}")]
     };
     let rows: Vec<Vec<String>> = most.iter().map(row).collect();
     page.table(&["sample (from 0)", "tip moves by", "its rms px"], rows.iter().map(Vec::as_slice));
@@ -164,8 +160,7 @@ fn influence(page: &mut Page, subject: &Subject<'_>) {
 /// Joint positions to record next, and what they would buy.
 fn suggested(page: &mut Page, subject: &Subject<'_>) {
     let Some(suggestion) = subject.suggestion else { return };
-    let length =
-        |length: f64| if suggestion.metric { format!("{:.3} mm", 1e3 * length) } else { format!("{length:.2e}") };
+    let length = |length: f64| length_in_words(length, suggestion.metric);
     page.section("suggested", "Where to move next");
     let of_samples = subject.calibration.report.tip.map(|tip| {
         format!(

@@ -1,9 +1,9 @@
 //! The page of an evaluation.
 use super::page::Page;
 use super::residuals::of_predictions;
-use super::{arm, noise, sections};
+use super::{arm, change, noise, sections};
 use crate::Error;
-use crate::calibrate::{CameraErrors, Evaluation, Finding};
+use crate::calibrate::{CameraErrors, Evaluation, Finding, ReadingNoise};
 use crate::recording::Recording;
 use crate::rig::Rig;
 
@@ -28,7 +28,7 @@ pub fn evaluation_html(
     summary(&mut page, rig, evaluation);
     sections::cameras(&mut page, rig, &evaluation.cameras, &residuals);
     noise::section(&mut page, rig, &residuals, &evaluation.fitting.findings);
-    sections::worst(&mut page, rig, &residuals);
+    sections::worst(&mut page, rig, &residuals, &evaluation.fitting.findings);
     sections::coverage(&mut page, rig, recording);
     arm::view(&mut page, rig, recording, arm::Shown::Few)?;
     page.section("next", "What to do next");
@@ -38,7 +38,7 @@ pub fn evaluation_html(
 
 /// How well it predicts, beside how well it was fitted.
 fn summary(page: &mut Page, rig: &Rig, evaluation: &Evaluation) {
-    let Evaluation { samples, rejected, total, fitting, .. } = evaluation;
+    let Evaluation { samples, rejected, total, fitting, reading_noise: (of_readings, _), .. } = evaluation;
     page.section("summary", "How well it predicts");
     let mut figures = Vec::new();
     if total.observations > total.points.observations {
@@ -47,6 +47,12 @@ fn summary(page: &mut Page, rig: &Rig, evaluation: &Evaluation) {
             figures.push((format!("{:.3} px", fitting.total.rms_px), "the same without what does not fit"));
         }
         figures.push((format!("{:.3} px", total.median_px), "median pixel distance"));
+        if of_readings.px > 0.0 {
+            figures.push((
+                format!("{:.3} px", of_readings.px),
+                "root mean square that noise of what was read of the robot gives alone",
+            ));
+        }
         let fitted = rig.fit.as_ref().filter(|fit| fit.rms_px > 0.0);
         figures.extend(
             fitted.map(|fit| (format!("{:.3} px", fit.rms_px), "the same root mean square when it was learned")),
@@ -55,6 +61,12 @@ fn summary(page: &mut Page, rig: &Rig, evaluation: &Evaluation) {
     if total.points.observations > 0 {
         let figure = format!("{:.3} mm", 1e3 * total.points.rms_m);
         figures.push((figure, "root mean square of the distances of depth cameras' points"));
+        if of_readings.m > 0.0 {
+            figures.push((
+                format!("{:.3} mm", 1e3 * of_readings.m),
+                "the same that noise of what was read of the robot gives alone",
+            ));
+        }
     }
     figures.extend([
         (samples.to_string(), "samples"),
@@ -63,11 +75,11 @@ fn summary(page: &mut Page, rig: &Rig, evaluation: &Evaluation) {
     ]);
     page.figures(&figures);
     if *rejected > 0 {
-        page.paragraph("Left out is what the rig does not know the feature or camera of, and what has neither joints nor a tip pose.");
+        page.paragraph("Left out is what the rig does not know the feature or camera of, and what does not follow from joints or a tip pose.");
     }
     if !fitting.findings.is_empty() {
         page.paragraph("What does not fit:");
-        page.list(&fitting.findings.iter().map(Finding::to_string).collect::<Vec<_>>());
+        page.list(&fitting.findings.iter().map(Finding::of_evaluation).collect::<Vec<_>>());
     }
     if total.behind > 0 {
         page.paragraph(&format!("{} detections are predicted behind their camera.", total.behind));
@@ -80,22 +92,33 @@ pub fn evaluation_steps(rig: &Rig, evaluation: &Evaluation) -> Vec<String> {
     let fit = rig.fit.as_ref();
     let usual_px = fit.map(|fit| fit.rms_px).filter(|px| *px > 0.0);
     let usual_m = fit.and_then(|fit| fit.rms_points_m).filter(|m| *m > 0.0);
-    let is_beyond = |found: f64, usual: Option<f64>, times: f64| usual.is_some_and(|usual| found > times * usual);
-    let total = &fitting.total;
-    let exceeds_px = |px: f64| is_beyond(total.rms_px, usual_px, TOGETHER) && is_beyond(px, usual_px, WORSE);
-    let exceeds_m = |m: f64| is_beyond(total.points.rms_m, usual_m, TOGETHER) && is_beyond(m, usual_m, WORSE);
+    // A fit takes the noise of readings out of its states; a prediction has it.
+    let is_beyond = |found: f64, usual: Option<f64>, of_readings: f64, times: f64| {
+        usual.is_some_and(|usual| found > times * usual.hypot(of_readings))
+    };
+    let (of_all, of_cameras) = &evaluation.reading_noise;
+    let all = &fitting.total;
+    let are_beyond_px = is_beyond(all.rms_px, usual_px, of_all.px, TOGETHER);
+    let are_beyond_m = is_beyond(all.points.rms_m, usual_m, of_all.m, TOGETHER);
     let moved = |name: &str| {
         let is_it = |finding: &Finding| matches!(finding, Finding::CameraMoved { camera, .. } if camera == name);
         fitting.findings.iter().any(is_it)
     };
-    let is_off = |camera: &&CameraErrors| {
-        let errors = &camera.errors;
-        moved(&camera.name) || exceeds_px(errors.rms_px) || exceeds_m(errors.points.rms_m)
+    let is_off = |(camera, of_readings): &(&CameraErrors, &ReadingNoise)| {
+        let CameraErrors { name, errors, .. } = camera;
+        let is_beyond_px = are_beyond_px && is_beyond(errors.rms_px, usual_px, of_readings.px, WORSE);
+        moved(name) || is_beyond_px || (are_beyond_m && is_beyond(errors.points.rms_m, usual_m, of_readings.m, WORSE))
     };
-    let off: Vec<&CameraErrors> = fitting.cameras.iter().filter(is_off).collect();
-    let seeing = evaluation.cameras.iter().filter(|camera| camera.errors.observations > 0).count();
-    let mut steps = Vec::new();
-    if !off.is_empty() && off.len() == seeing && seeing > 1 {
+    let off: Vec<&CameraErrors> =
+        fitting.cameras.iter().zip(of_cameras).filter(is_off).map(|(camera, _)| camera).collect();
+    let seeing = evaluation.cameras.iter().filter(|camera| camera.errors.observations > 0);
+    let seeing: Vec<&str> = seeing.map(|camera| camera.name.as_str()).collect();
+    let medians = evaluation.sample_median_px.iter().zip(&evaluation.sample_median_m).enumerate();
+    let judged: Vec<usize> =
+        medians.filter(|(_, (px, m))| px.is_some() || m.is_some()).map(|(sample, _)| sample).collect();
+    let changed = change::when(&judged, &fitting.findings);
+    let mut steps: Vec<String> = changed.iter().map(|when| change::words(when, &seeing)).collect();
+    if !off.is_empty() && off.len() == seeing.len() && seeing.len() > 1 {
         steps.push(
             "Every camera is further off than when the rig was learned: handeye monitor tells whether the base, a joint or the features \
              moved, and handeye check whether the recording is in order."
@@ -112,13 +135,18 @@ pub fn evaluation_steps(rig: &Rig, evaluation: &Evaluation) -> Vec<String> {
         steps.extend(off.into_iter().map(words));
     }
     let mistakes = |finding: &Finding| {
+        let is_explained = changed.is_some() && change::sample_of(finding).is_some();
         matches!(finding, Finding::WrongJoints { .. } | Finding::WrongImage { .. } | Finding::Outliers { .. })
+            && !is_explained
     };
     let has_mistakes = fitting.findings.iter().any(mistakes);
     if steps.is_empty() {
         let besides = if has_mistakes { "Without what does not fit, it" } else { "It" };
         steps.push(if usual_px.or(usual_m).is_some() {
-            format!("{besides} predicts these samples about as well as those that it was learned from: nothing needs to be done.")
+            let noise = if of_all.px > 0.0 || of_all.m > 0.0 { " but for the noise of what was read of the robot" } else { "" };
+            format!(
+                "{besides} predicts these samples about as well as those that it was learned from{noise}: nothing needs to be done."
+            )
         } else {
             "The rig does not say what it was learned from; compare the distances with the noise of the detector."
                 .to_owned()

@@ -1,6 +1,7 @@
 //! Calibrations, evaluations and servo runs, each as one page to read: self-contained HTML, light and dark, for screen, phone and paper.
 mod arm;
 mod calibration;
+mod change;
 mod charts;
 mod combinations;
 mod evaluation;

@@ -3,7 +3,7 @@ use super::charts::histogram;
 use super::page::Page;
 use super::residuals::Residual;
 use super::sections::scales;
-use crate::calibrate::Finding;
+use crate::calibrate::{Finding, Kind, is_wrong, yardstick};
 use crate::rig::Rig;
 use std::collections::BTreeMap;
 
@@ -14,13 +14,10 @@ const TAILS: f64 = 3.0;
 /// Errors of one image that go the same way this many times as much as independent ones do are not noise.
 const SHIFTED: f64 = 2.0;
 
-/// Detections beyond this many standard deviations were left out one by one, as in a calibration.
-const WRONG: f64 = 10.0;
-
 /// The answer, and the distances beside what Gaussian noise of their own size gives. `findings`: what was left out.
 pub(super) fn section(page: &mut Page, rig: &Rig, residuals: &[Residual], findings: &[Finding]) {
     let sds = scales(rig, residuals);
-    let used = in_use(rig, residuals, findings, &sds);
+    let used = in_use(rig, residuals, findings);
     if used.is_empty() {
         return;
     }
@@ -41,12 +38,17 @@ pub(super) fn section(page: &mut Page, rig: &Rig, residuals: &[Residual], findin
 /// Whether nothing but noise is in the errors of what was not left out; true where there are none.
 pub(super) fn is_alone(rig: &Rig, residuals: &[Residual], findings: &[Finding]) -> bool {
     let sds = scales(rig, residuals);
-    let used = in_use(rig, residuals, findings, &sds);
+    let used = in_use(rig, residuals, findings);
     used.is_empty() || answer(&used, &sds).0
 }
 
-fn in_use<'a>(rig: &Rig, residuals: &'a [Residual], findings: &[Finding], sds: &[f64]) -> Vec<&'a Residual> {
-    residuals.iter().filter(|one| !is_left_out(rig, one, findings, sds)).collect()
+/// What was not left out, with others or by itself, as a calibration judges it.
+pub(super) fn in_use<'a>(rig: &Rig, residuals: &'a [Residual], findings: &[Finding]) -> Vec<&'a Residual> {
+    let mut used: Vec<&Residual> = residuals.iter().filter(|one| !is_named(rig, one, findings)).collect();
+    let mut distances: Vec<f64> = used.iter().map(|one| one.distance()).collect();
+    let yardstick = yardstick(Kind::Pixels, rig.noise.pixels, &mut distances);
+    used.retain(|one| !is_wrong(one.distance(), yardstick));
+    used
 }
 
 fn over_sd(residual: &Residual, sds: &[f64]) -> [f64; 2] {
@@ -80,15 +82,16 @@ fn answer(used: &[&Residual], sds: &[f64]) -> (bool, String) {
     let words = match (beyond > most_beyond, shifted > most_shifted) {
         (false, false) => return (true, format!("Yes: {figures}.")),
         (_, true) => {
-            "Whole images are shifted, by joints that do not repeat, a lens model that leaves something out, or images that were not taken where \
-             the joints were read; so the standard deviations on this page, which count every detection as independent, are too small."
+            "Whole images are shifted, by joints that do not repeat or are read with noise, a lens model that leaves something out, or images \
+             that were not taken where the joints were read."
         }
         (true, false) => "There are more large errors than noise makes: single detections are wrong.",
     };
     (false, format!("No: {figures}. {words}"))
 }
 
-fn is_left_out(rig: &Rig, residual: &Residual, findings: &[Finding], sds: &[f64]) -> bool {
+/// True for a detection of a sample, an image or a camera that is named as not fitting.
+fn is_named(rig: &Rig, residual: &Residual, findings: &[Finding]) -> bool {
     let camera_name = &rig.cameras[residual.camera].name;
     let is_meant = |finding: &Finding| match finding {
         Finding::WrongJoints { sample, .. } | Finding::UnknownState { sample } => *sample == residual.sample,
@@ -99,5 +102,5 @@ fn is_left_out(rig: &Rig, residual: &Residual, findings: &[Finding], sds: &[f64]
         | Finding::Misfit { .. }
         | Finding::MissedLength { .. } => false,
     };
-    residual.distance() > WRONG * sds[residual.camera].max(rig.noise.pixels) || findings.iter().any(is_meant)
+    findings.iter().any(is_meant)
 }

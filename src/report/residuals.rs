@@ -1,10 +1,9 @@
 //! Predicted minus seen, detection by detection.
 use crate::Error;
-use crate::calibrate::Correspondence;
+use crate::calibrate::{Correspondence, Placed};
 use crate::infer::{InferOptions, Inference, Names, Prior, Sightings, TipInference};
 use crate::recording::{Recording, Sample};
-use crate::rig::{Model, Parent, Rig};
-use handeye_solvers::Pose;
+use crate::rig::{Model, Rig};
 
 /// How far a detection is from what a rig predicts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,16 +47,15 @@ fn of_states(rig: &Rig, recording: &Recording, mut states: States) -> Result<Vec
     let index = Correspondence::new(rig, recording);
     let mut residuals = Vec::new();
     for (number, sample) in recording.samples.iter().enumerate() {
-        let Some(Placed { links, is_tip_alone }) = states.links(&model, sample)? else { continue };
+        let Some(placed) = states.links(&model, sample)? else { continue };
         for detection in &sample.pixels {
             let known = (index.cameras[detection.camera as usize], index.features[detection.feature as usize]);
             let (Some(camera), Some(feature)) = known else { continue };
             let on = [model.cameras[camera].parent, model.features[feature].parent];
-            if !model.cameras[camera].has_lens() || (is_tip_alone && on.iter().any(|parent| is_inner(*parent, &model)))
-            {
+            if !model.cameras[camera].has_lens() || !on.iter().all(|parent| placed.knows(&model, *parent)) {
                 continue;
             }
-            let [u, v] = model.pixel(camera, feature, &links);
+            let [u, v] = model.pixel(camera, feature, &placed.links);
             let error = [u - detection.pixel[0], v - detection.pixel[1]];
             residuals.push(Residual { sample: number, camera, feature, seen: detection.pixel, error });
         }
@@ -99,41 +97,20 @@ impl States {
     /// `None` where nothing determines them.
     fn links(&mut self, model: &Model, sample: &Sample) -> Result<Option<Placed>, Error> {
         if self.is_read {
-            let joints = sample.joints.as_ref().map(|read| Placed { links: model.links(read), is_tip_alone: false });
-            return Ok(joints.or_else(|| sample.pose.map(|pose| Placed::by_tip(model, pose))));
+            return Ok(Placed::read(model, sample));
         }
         let (pixels, points) = (self.names.sightings(sample), self.names.points(sample));
         let seen = Sightings { pixels: &pixels, points: &points };
         if let (Some(inference), Some(read)) = (&mut self.joints, &sample.joints) {
             if self.joint_sd <= 0.0 {
-                return Ok(Some(Placed { links: model.links(read), is_tip_alone: false }));
+                return Ok(Some(Placed::by_joints(model, read)));
             }
             let refined = inference.joints_near(seen, &Prior::readings(read, self.joint_sd));
-            return Ok(refined.ok().map(|branch| Placed { links: model.links(&branch.joints), is_tip_alone: false }));
+            return Ok(refined.ok().map(|branch| Placed::by_joints(model, &branch.joints)));
         }
         // Where joints were not read, the tip's pose is all that pixels of features on it need.
         let exact = sample.pose.filter(|_| self.is_pose_exact);
         let tip = exact.or_else(|| Some(self.tip.poses(seen).into_iter().next()?.pose));
         Ok(tip.map(|tip| Placed::by_tip(model, tip)))
     }
-}
-
-/// Links in the world, from the base on.
-pub(super) struct Placed {
-    pub links: Vec<Pose>,
-    /// True where the links between base and tip stand at the tip: nobody knows them.
-    pub is_tip_alone: bool,
-}
-
-impl Placed {
-    /// From the tip's pose alone.
-    pub fn by_tip(model: &Model, tip: Pose) -> Self {
-        let links = std::iter::once(model.base).chain(vec![tip; model.chain.len().max(1)]).collect();
-        Placed { links, is_tip_alone: true }
-    }
-}
-
-/// True for a link between base and tip.
-pub(super) fn is_inner(parent: Parent, model: &Model) -> bool {
-    matches!(parent, Parent::Link(joint) if joint + 1 < model.chain.len())
 }

@@ -1,8 +1,9 @@
 //! Sections that several pages share: how well a rig predicts a recording.
 use super::charts::{Strip, map, scatter, strips};
+use super::noise::in_use;
 use super::page::Page;
 use super::residuals::Residual;
-use crate::calibrate::{CameraErrors, median};
+use crate::calibrate::{CameraErrors, Finding, median};
 use crate::chain::JointKind;
 use crate::recording::Recording;
 use crate::rig::Rig;
@@ -13,6 +14,9 @@ const DRAWN: usize = 4;
 
 /// Scatter and map of every camera's residuals.
 pub(super) fn cameras(page: &mut Page, rig: &Rig, cameras: &[CameraErrors], residuals: &[Residual]) {
+    if cameras.is_empty() {
+        return;
+    }
     page.section("cameras", "Cameras");
     let has_points = cameras.iter().any(|camera| camera.errors.points.observations > 0);
     let row = |CameraErrors { name, errors, rejected }: &CameraErrors| {
@@ -65,10 +69,11 @@ fn extent(residuals: &[&Residual]) -> [f64; 2] {
 }
 
 /// The samples that are worst as a whole, with their images: a single wrong detection does not make one.
-pub(super) fn worst(page: &mut Page, rig: &Rig, residuals: &[Residual]) {
-    let mut samples: Vec<(&[Residual], f64)> = Vec::new();
-    for of_sample in residuals.chunk_by(|a, b| a.sample == b.sample) {
-        samples.push((of_sample, median(&mut of_sample.iter().map(Residual::distance).collect::<Vec<_>>())));
+pub(super) fn worst(page: &mut Page, rig: &Rig, residuals: &[Residual], findings: &[Finding]) {
+    let used = in_use(rig, residuals, findings);
+    let mut samples: Vec<(&[&Residual], f64)> = Vec::new();
+    for of_sample in used.chunk_by(|a, b| a.sample == b.sample) {
+        samples.push((of_sample, median(&mut of_sample.iter().map(|one| one.distance()).collect::<Vec<_>>())));
     }
     samples.sort_by(|a, b| b.1.total_cmp(&a.1));
     samples.truncate(WORST);
@@ -76,8 +81,11 @@ pub(super) fn worst(page: &mut Page, rig: &Rig, residuals: &[Residual]) {
         return;
     }
     page.section("worst", "The samples that fit worst");
+    if used.len() < residuals.len() {
+        page.paragraph("Of the detections that are not named as not fitting.");
+    }
     let sds = scales(rig, residuals);
-    let row = |(of_sample, median_px): &(&[Residual], f64)| {
+    let row = |(of_sample, median_px): &(&[&Residual], f64)| {
         let n_far = of_sample.iter().filter(|residual| residual.distance() > 6.0 * sds[residual.camera]).count();
         vec![of_sample[0].sample.to_string(), format!("{median_px:.3}"), of_sample.len().to_string(), n_far.to_string()]
     };
@@ -87,7 +95,7 @@ pub(super) fn worst(page: &mut Page, rig: &Rig, residuals: &[Residual]) {
     page.begin_row();
     for (of_sample, median_px) in samples.iter().take(DRAWN) {
         for (index, camera) in rig.cameras.iter().enumerate() {
-            let own: Vec<&Residual> = of_sample.iter().filter(|residual| residual.camera == index).collect();
+            let own: Vec<&Residual> = of_sample.iter().copied().filter(|residual| residual.camera == index).collect();
             if own.is_empty() {
                 continue;
             }

@@ -1,9 +1,10 @@
 //! What was learned, number by number, beside what was known.
 use super::calibration::Subject;
 use super::page::Page;
-use crate::calibrate::prior_sds;
-use crate::rig::{Camera, Parameter, Rig, Value};
+use crate::calibrate::{Finding, prior_sds, with_headers};
+use crate::rig::{Parameter, Rig, Value};
 use handeye_solvers::manifold::so3;
+use std::collections::BTreeMap;
 
 /// A number is that of its prior where its standard deviation exceeds this share of the prior's.
 const ASSUMED: f64 = 0.9;
@@ -11,8 +12,12 @@ const ASSUMED: f64 = 0.9;
 /// One row per parameter: before, learned, standard deviation.
 pub(super) fn table(page: &mut Page, subject: &Subject<'_>) {
     let after = &subject.calibration.rig;
-    let before = &start(subject);
+    let before = &with_headers(subject.before, subject.recording);
     let sd = after.fit.as_ref().map(|fit| &fit.sd);
+    let moved = |path: &str| {
+        let is_of = |finding: &Finding| matches!(finding, Finding::CameraMoved { camera, .. } if path.starts_with(&format!("cameras.{camera}.")));
+        subject.calibration.report.findings.iter().any(is_of)
+    };
     let mut rows = Vec::new();
     for parameter in after.parameters() {
         let path = parameter.path(after);
@@ -29,6 +34,9 @@ pub(super) fn table(page: &mut Page, subject: &Subject<'_>) {
                 };
                 sd.iter().enumerate().map(cell).collect::<Vec<_>>().join(", ")
             }
+            None if moved(&path) || sd.is_none_or(BTreeMap::is_empty) && !after.is_fixed(&parameter) => {
+                "not known".to_owned()
+            }
             None => "held".to_owned(),
         };
         let known = known.map_or_else(|| "-".to_owned(), |known| joined(&known, fixed));
@@ -39,27 +47,6 @@ pub(super) fn table(page: &mut Page, subject: &Subject<'_>) {
                     the recording leaves; where it says assumed, the recording tells next to nothing, and the number is that of the prior. What hangs \
                     on such numbers, as features do on the frame of the last link, has their deviation too.");
     page.table(&["", "before", "learned", "standard deviation"], rows.iter().map(Vec::as_slice));
-}
-
-/// What learning started from: the rig that was given, and of its cameras what the recording's header says besides.
-fn start(subject: &Subject<'_>) -> Rig {
-    let mut before = subject.before.clone();
-    for recorded in &subject.recording.cameras {
-        if before.cameras.iter().all(|camera| camera.name != recorded.name) {
-            before.cameras.push(Camera { name: recorded.name.clone(), ..Camera::default() });
-        }
-        let Some(camera) = before.cameras.iter_mut().find(|camera| camera.name == recorded.name) else { continue };
-        if camera.distortion.is_none() && camera.model.is_none_or(|model| recorded.model.is_none_or(|own| own == model))
-        {
-            camera.distortion = recorded.distortion.clone();
-        }
-        camera.size = camera.size.or(recorded.size);
-        camera.fx = camera.fx.or(recorded.fx);
-        camera.fy = camera.fy.or(recorded.fy);
-        camera.cx = camera.cx.or(recorded.cx);
-        camera.cy = camera.cy.or(recorded.cy);
-    }
-    before
 }
 
 /// The numbers of a parameter; `None` where it has no value.

@@ -1,9 +1,10 @@
 //! The answer in three lines: how well a rig fits, how well its tip is known, and what to do first.
 use super::calibration::Subject;
+use super::change;
 use super::noise;
 use super::page::Page;
 use super::residuals::Residual;
-use crate::calibrate::{Finding, Report, assumptions};
+use crate::calibrate::{Distance, Finding, Report, assumptions};
 
 /// Said where errors do not look like noise.
 const OTHER_THAN_NOISE: &str =
@@ -20,8 +21,8 @@ pub(super) fn section(page: &mut Page, subject: &Subject<'_>, residuals: &[Resid
 
 /// How well it fits, beside what the noise lets expect, and what was left out.
 fn fit(subject: &Subject<'_>) -> String {
-    let Report { observations, points, rejected, rms_px, .. } = subject.calibration.report;
     let report = &subject.calibration.report;
+    let Report { observations, points, rejected, rms_px, .. } = *report;
     let noise = &subject.calibration.rig.noise;
     let mut parts = Vec::new();
     if let Some(targets) = &report.targets {
@@ -30,13 +31,14 @@ fn fit(subject: &Subject<'_>) -> String {
         // Two coordinates make a distance.
         let expected = noise.pixels * f64::sqrt(2.0);
         parts.push(format!(
-            "{rms_px:.3} px rms, where noise of {} px a coordinate gives {expected:.3} px",
-            noise.pixels
+            "{rms_px:.3} px rms, where noise of {} a coordinate gives {expected:.3} px",
+            Distance::Pixels(noise.pixels).rounded()
         ));
     }
     if points.observations > 0 {
-        let (rms, sd) = (1e3 * points.rms_m, 1e3 * noise.points);
-        parts.push(format!("{rms:.3} mm rms, where noise of {sd} mm a coordinate gives {:.3} mm", sd * f64::sqrt(3.0)));
+        let (rms, expected) = (1e3 * points.rms_m, 1e3 * noise.points * f64::sqrt(3.0));
+        let sd = Distance::Metres(noise.points).rounded();
+        parts.push(format!("{rms:.3} mm rms, where noise of {sd} a coordinate gives {expected:.3} mm"));
     }
     let left_out = match rejected {
         0 => "nothing was left out".to_owned(),
@@ -67,22 +69,16 @@ fn tip(subject: &Subject<'_>) -> String {
     let Some(tip) = subject.calibration.report.tip else {
         return "Of the tip's position nothing was learned, or the recording leaves it open.".to_owned();
     };
-    let unit =
-        if tip.metric { "" } else { " in the model's unit, since nothing metric is known: lengths have no unit" };
-    if !tip.hangs_on_priors() {
-        return format!(
-            "The tip's position is known to {}{unit} by the data (one standard deviation, median over the samples).",
-            tip.length(tip.median)
-        );
+    let mut words = format!("The tip's position is known to {tip}.");
+    if tip.hangs_on_priors() {
+        let assumed = assumptions(subject.before, subject.recording).join(", ");
+        words += &if assumed.is_empty() {
+            String::new()
+        } else {
+            format!(" What was assumed of what was given: {assumed}.")
+        };
     }
-    format!(
-        "The tip's position is known to {}{unit} by the data alone, and to {} with the priors (one standard deviation, median over the \
-         samples): what pixels do not tell, above all the scale, comes only from what was assumed of the rig, which is {}. The frames of base \
-         and tip are taken as they are.",
-        tip.length(tip.by_data),
-        tip.length(tip.median),
-        assumptions(subject.before).join(", ")
-    )
+    words
 }
 
 /// What a reader may do, the most urgent first.
@@ -96,6 +92,23 @@ pub(super) fn steps(subject: &Subject<'_>) -> Vec<String> {
     }
     let misfit = |finding: &Finding| matches!(finding, Finding::Misfit { .. });
     steps.extend(report.findings.iter().filter(|one| misfit(one)).map(|one| format!("Find the reason: {one}.")));
+    let is_seen = |index: &usize| {
+        let sample = &subject.recording.samples[*index];
+        !sample.pixels.is_empty() || !sample.points.is_empty()
+    };
+    let judged: Vec<usize> = (0..subject.recording.samples.len()).filter(is_seen).collect();
+    let seeing = report.cameras.iter().filter(|camera| camera.errors.observations + camera.rejected > 0);
+    let seeing: Vec<&str> = seeing.map(|camera| camera.name.as_str()).collect();
+    let changed = change::when(&judged, &report.findings);
+    steps.extend(changed.iter().map(|when| change::words(when, &seeing)));
+    let moved = |finding: &Finding| match finding {
+        Finding::CameraMoved { camera, .. } => Some(format!(
+            "Camera `{camera}` moved: the rig has it where it was for most of the recording. handeye calibrate --relearn cameras.{camera} learns \
+             it anew from the samples of where it is now."
+        )),
+        _ => None,
+    };
+    steps.extend(report.findings.iter().filter_map(moved));
     // Combinations that differ in little ask for the same.
     let mut cures: Vec<&str> = Vec::new();
     for cure in report.weak.iter().map(|weak| weak.cure.as_str()).filter(|cure| !cure.is_empty()) {
@@ -105,13 +118,21 @@ pub(super) fn steps(subject: &Subject<'_>) -> Vec<String> {
         }
     }
     steps.extend(cures.into_iter().take(3).map(|cure| format!("To determine more: {cure}.")));
-    if report.findings.iter().any(|finding| !misfit(finding)) {
+    let explained = |finding: &Finding| {
+        misfit(finding) || moved(finding).is_some() || (changed.is_some() && change::sample_of(finding).is_some())
+    };
+    if report.findings.iter().any(|finding| !explained(finding)) {
         steps.push(
             "What does not fit was left out, so nothing has to be mended before the rig is used; to use it too, mend the recording where it \
              is a mistake, and learn again."
                 .to_owned(),
         );
     }
-    steps.push("Judge the rig on samples that it has not seen: handeye evaluate.".to_owned());
+    steps.push(if report.targets.is_some() {
+        "Learn from a second recording too: the poses of both agree within a few of their standard deviations."
+            .to_owned()
+    } else {
+        "Judge the rig on samples that it has not seen: handeye evaluate.".to_owned()
+    });
     steps
 }

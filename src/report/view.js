@@ -53,8 +53,10 @@
       const width = context.measureText(name).width;
       const box = { name, x: Math.max(0, Math.min(x + 10 * ratio(), canvas.width - width)), y: Math.max(height, y - 6 * ratio()), width, height };
       const covered = (other) => box.x < other.x + other.width && other.x < box.x + box.width && Math.abs(box.y - other.y) < height;
-      for (let hit = boxes.find(covered); hit; hit = boxes.find(covered)) box.y = hit.y + height;
+      // From the top down, so that what is below one box is below all before it.
+      boxes.forEach((other) => { if (covered(other)) box.y = other.y + height; });
       boxes.push(box);
+      boxes.sort((one, other) => one.y - other.y);
       context.beginPath();
       context.moveTo(x, y);
       context.lineTo(box.x, box.y - height / 3);

@@ -38,6 +38,7 @@ mod recording_files;
 mod relearn;
 mod report;
 mod report_answers;
+mod report_evaluations;
 mod rig_files;
 mod servo;
 mod servo_every_limit;

@@ -1,10 +1,12 @@
 //! Pages answer in words: how good a rig is, what hangs on assumptions, what was left out, and what to do next.
 use crate::cli::Folder;
-use handeye::calibrate::{Calibration, Options, calibrate, evaluate};
+use handeye::calibrate::{Calibration, Options, assumptions, calibrate, evaluate};
 use handeye::recording::{Detection, RecordedCamera, Recording};
 use handeye::report::{Subject, evaluation_steps, html};
-use handeye::rig::{Rig, catalog};
+use handeye::rig::{Rig, Robot, catalog};
 use handeye::simulate::{SimulateOptions, random_rig, simulate};
+use handeye::solvers::Pose;
+use nalgebra::Vector3;
 use serde_json::Value;
 use std::ops::ControlFlow;
 
@@ -178,4 +180,95 @@ fn a_camera_that_was_always_worse_than_the_others_is_not_said_to_be_off() {
     assert!(of_camera > 1.5, "{of_camera}");
     let steps = evaluation_steps(&learned.rig, &judged);
     assert!(steps[0].contains("about as well as those that it was learned from"), "{steps:?}");
+}
+
+#[test]
+fn a_verdict_says_what_was_assumed_and_what_is_least_known_and_no_more() {
+    let truth = catalog::rig("ur5").unwrap();
+    let recording =
+        simulate(&truth, &SimulateOptions { samples: 40, seed: 4, ..SimulateOptions::default() }).unwrap().recording;
+    let (calibration, page) = learned(&truth, &recording);
+    let verdict = section(&page, "verdict");
+    assert!(calibration.report.tip.unwrap().hangs_on_priors());
+    // The world is where its cameras are, which the rig gives to 100 mm each.
+    assert!(
+        verdict.contains("camera") && !verdict.contains("scale") && !verdict.contains("frames of base"),
+        "{verdict}"
+    );
+    for words in
+        ["±3 % on each of the 4 focal lengths", "±2 % of the image on each of the 4 coordinates of image centres"]
+    {
+        assert!(verdict.contains(words), "{words}: {verdict}");
+    }
+    let mut stated = Rig { robot: Robot { base: Some(Pose::identity()), ..truth.robot.clone() }, ..truth.clone() };
+    let priors = [("robot", 0.01), ("cameras.*.fx", 5.0), ("features", 0.002)];
+    stated.estimate.prior = priors.map(|(path, sd)| (path.to_owned(), sd)).into();
+    let said = assumptions(&stated, &recording).join(", ");
+    for words in
+        ["±0.01 m and rad on robot ", "±5 px on cameras.*.fx ", "±0.002 m on features ", "of the 2 focal lengths"]
+    {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    stated.estimate.prior.clear();
+    let said = assumptions(&stated, &recording);
+    assert!(said[0].starts_with("±10 mm and ±0.02 rad on the pose of the base"), "{said:?}");
+    // A lens of the recording's header is assumed as one of the rig.
+    let no_lens = Rig { cameras: Vec::new(), ..truth };
+    let mut headed = recording.clone();
+    headed
+        .cameras
+        .iter_mut()
+        .zip(&stated.cameras)
+        .for_each(|(recorded, camera)| *recorded = RecordedCamera::from(camera));
+    assert!(assumptions(&no_lens, &headed).iter().any(|one| one.contains("4 focal lengths")));
+    assert!(
+        !assumptions(&no_lens, &Recording { cameras: Vec::new(), ..recording }).iter().any(|one| one.contains("focal"))
+    );
+}
+
+#[test]
+fn where_nothing_is_metric_no_length_has_a_unit() {
+    let truth = random_rig(6, 2, 12, 3);
+    let recording = simulate(&truth, &SimulateOptions { samples: 40, ..SimulateOptions::default() }).unwrap().recording;
+    let unknown = Rig { noise: truth.noise, ..Rig::default() };
+    let (calibration, page) = learned(&unknown, &recording);
+    let (verdict, summary) = (section(&page, "verdict"), section(&page, "summary"));
+    let tip = calibration.report.tip.unwrap();
+    assert!(!calibration.report.metric && !tip.metric);
+    assert!(verdict.contains(&format!("The tip's position is known to {tip}")), "{verdict}");
+    assert!(summary.contains("the pose of camera `") && summary.contains("in the model's unit"), "{summary}");
+    assert!(!verdict.contains(" mm") && !summary.contains(" mm"), "{verdict}{summary}");
+}
+
+#[test]
+fn noise_is_told_to_the_digits_that_count() {
+    let (mut known, recording) = spoilt();
+    known.noise.pixels = 0.312_345_678_9;
+    let (_, page) = learned(&known, &recording);
+    assert!(section(&page, "verdict").contains("where noise of 0.312 px a coordinate gives 0.442 px"));
+}
+
+#[test]
+fn a_number_is_called_held_only_where_it_was() {
+    let truth = random_rig(6, 3, 12, 1);
+    let record = |rig: &Rig, samples, seed| {
+        simulate(rig, &SimulateOptions { samples, seed, ..SimulateOptions::default() }).unwrap().recording
+    };
+    let mut moved = truth.clone();
+    let turn = Pose::new(Vector3::new(0.0, 0.03, 0.0), Vector3::new(0.02, 0.0, 0.0));
+    moved.cameras[1].pose = truth.cameras[1].pose.map(|pose| pose * turn);
+    let mut recording = record(&truth, 40, 1);
+    recording.samples.extend(record(&moved, 10, 2).samples);
+    let mut known = truth.clone();
+    known.estimate.fixed = vec!["cameras.*.cx".to_owned()];
+    let (_, page) = learned(&known, &recording);
+    let last = |path: &str| {
+        let row = page.split(&format!("<td>{path}</td>")).nth(1).unwrap().split("</tr>").next().unwrap();
+        row.rsplit("<td>").next().unwrap().trim_end_matches("</td>").to_owned()
+    };
+    let names: Vec<&str> = truth.cameras.iter().map(|camera| camera.name.as_str()).collect();
+    assert_eq!(last(&format!("cameras.{}.cx", names[0])), "held");
+    // It was placed by itself, and nothing is said of how well.
+    assert_eq!(last(&format!("cameras.{}.pose", names[1])), "not known");
+    assert!(last(&format!("cameras.{}.pose", names[2])).contains("e-"));
 }

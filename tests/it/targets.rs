@@ -1,4 +1,5 @@
 //! Cameras and targets are learned from poses of targets, with the images' clock and the scale, and what is open is said.
+use crate::cli::Folder;
 use handeye::calibrate::{Calibration, Options, calibrate};
 use handeye::recording::{RecordedCamera, Recording, Sample, TargetDetection};
 use handeye::rig::{Camera, Model, Parent, PoseNoise, Rig};
@@ -336,4 +337,34 @@ fn a_clock_that_is_ahead_is_found_where_robot_and_images_were_recorded_apart() {
         let errors = errors(&learned.rig, &world);
         assert!(errors.iter().all(|error| *error < 0.003), "seed {seed}: {errors:?}");
     }
+}
+
+/// A hand-eye calibration as most are recorded: poses of the robot and of a board, joints besides, and nothing of a lens.
+#[test]
+fn a_page_needs_no_lens_and_the_rig_is_written() {
+    let folder = Folder::new("targets-page");
+    let mut random = ChaCha8Rng::seed_from_u64(7);
+    let world = world(&mut random, true);
+    let spoilt = Spoilt { target: PoseNoise { xyz: 0.001, rot: 0.001 }, ..Spoilt::default() };
+    let mut samples: Vec<Sample> = Vec::new();
+    for _ in 0..15 {
+        let tip = pose(&mut random, 0.8, 0.3);
+        samples.push(world.sample(&mut random, tip, spoilt));
+    }
+    let mut recording = recording(samples);
+    let are_written = |recording: &Recording| {
+        recording.write(&folder.path().join("poses.jsonl")).unwrap();
+        world.rig().write(&folder.path().join("rig.toml"), None).unwrap();
+        let (said, _) = folder.expect(0, "calibrate poses.jsonl --rig rig.toml -o learned.toml --report page.html");
+        assert!(said.starts_with("learned 1 camera pose, 1 target from"), "{said}");
+        let learned = Rig::parse(&folder.read("learned.toml"), "learned.toml").unwrap();
+        assert!(errors(&learned, &world).iter().all(|error| *error < 0.003));
+        let page = folder.read("page.html");
+        assert!(page.contains("<h2>Where everything is</h2>") && page.contains("\"name\":\"camera\""));
+        assert!(!page.contains("handeye evaluate") && !said.contains("handeye evaluate"), "nothing can be predicted");
+    };
+    are_written(&recording);
+    recording.joints = vec!["a".to_owned(), "b".to_owned()];
+    recording.samples.iter_mut().for_each(|sample| sample.joints = Some(vec![0.1, 0.2]));
+    are_written(&recording);
 }

@@ -1,6 +1,6 @@
 //! Controllers: from what is seen to what the robot shall do.
 use super::decision::Decision;
-use super::limits::Limit;
+use super::limits::{Limit, those_of};
 use super::step::read;
 use crate::arrays::{Floats, vector};
 use crate::errors::{raise, unusable};
@@ -115,7 +115,7 @@ impl Controller {
         if let Some(joints) = joints {
             read("joints", joints, self.rig.robot.joints.len(), &mut readings)?;
         }
-        let limits: Vec<_> = limits.iter().flatten().map(|limit| &limit.get().inner).collect();
+        let limits = those_of(limits.as_deref(), &self.layout, self.rig.robot.joints.len())?;
         // Others run on while it thinks; the lock is taken without Python's, which a holder of it may wait for.
         let decided = py.detach(|| {
             let limits: Vec<&dyn servo::Limit> = limits.iter().map(|limit| *limit as &dyn servo::Limit).collect();

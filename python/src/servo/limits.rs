@@ -3,7 +3,7 @@ use super::tasks::positive;
 use crate::arrays::{Floats, pose, three};
 use crate::errors::unusable;
 use crate::rig::{AnyRig, Rig};
-use crate::sight::Layout;
+use crate::sight::{Layout, is_known};
 use handeye::servo::limits::{self, Guide};
 use handeye::servo::{Arm, Configuration, LimitRows};
 use pyo3::prelude::*;
@@ -203,6 +203,29 @@ impl VirtualFixture {
         let (tolerance, strength) = (positive("tolerance", tolerance)?, positive("strength", strength)?);
         Ok(new(VirtualFixture, Kind::VirtualFixture(limits::VirtualFixture { guide, tolerance, strength })))
     }
+}
+
+/// Limits that are given along, where they fit a robot of so many joints with such cameras and features: those of another rig have other indices.
+pub fn those_of<'a>(
+    given: Option<&'a [Bound<'_, Limit>]>,
+    layout: &Layout,
+    n_joints: usize,
+) -> PyResult<Vec<&'a Kind>> {
+    let fits = |limit: &'a Bound<'_, Limit>| {
+        let kind = &limit.get().inner;
+        match kind {
+            Kind::InImage(limits::InImage { camera, features, .. })
+            | Kind::PixelSpeed(limits::PixelSpeed { camera, features, .. }) => {
+                features.iter().try_for_each(|feature| layout.check_has("limits", *camera, *feature))?;
+            }
+            Kind::LinkDistance(limit) => {
+                limit.links.iter().try_for_each(|link| is_known("limits", "link", *link, n_joints + 1))?
+            }
+            Kind::HalfSpace(_) | Kind::TipBox(_) | Kind::TipSpeed(_) | Kind::VirtualFixture(_) => {}
+        }
+        Ok(kind)
+    };
+    given.into_iter().flatten().map(fits).collect()
 }
 
 /// Indices of a camera and of features, all where none is named.

@@ -2,7 +2,7 @@
 use super::controllers::{Controller, Shared};
 use super::decision::{MotionCommand, Stop};
 use super::held_back::{Active, words_of};
-use super::limits::Limit;
+use super::limits::{Limit, those_of};
 use super::step::read;
 use crate::errors::raise;
 use crate::sight::Layout;
@@ -100,7 +100,7 @@ impl ServoLoop {
         if let Some(joints) = joints {
             read("joints", joints, self.rig.robot.joints.len(), &mut self.joints)?;
         }
-        let limits: Vec<_> = limits.iter().flatten().map(|limit| &limit.get().inner).collect();
+        let limits = those_of(limits.as_deref(), &self.layout, self.rig.robot.joints.len())?;
         let (servo, joints, seen) = (&mut self.inner, &self.joints, &self.seen);
         let ticked = py.detach(|| {
             let limits: Vec<&dyn handeye::servo::Limit> =

@@ -1,13 +1,15 @@
 //! One step towards goals, under limits.
 use super::held_back::{Active, words_of};
-use super::limits::Limit;
+use super::limits::{Limit, those_of};
 use super::tasks::Task;
 use crate::arrays::{Floats, NewArray, array, list, vector};
 use crate::errors::{raise, unusable};
 use crate::rig::AnyRig;
+use crate::sight::Layout;
 use handeye::rig;
 use handeye::servo::{self, Arm, Configuration};
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use std::sync::Arc;
 
@@ -28,6 +30,10 @@ impl Goal {
     #[pyo3(signature = (task, *, priority = 0, share = 1.0))]
     fn new(task: Py<Task>, priority: usize, share: f64) -> PyResult<Self> {
         if share > 0.0 && share <= 1.0 { Ok(Goal { task, priority, share }) } else { Err(unusable("share: in (0, 1]")) }
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.task)
     }
 }
 
@@ -72,7 +78,7 @@ impl Stepper {
         limits: Option<Vec<Bound<'_, Limit>>>,
         velocity: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Step> {
-        let n = self.arm.joints();
+        let (n, layout) = (self.arm.joints(), Layout::of(&self.rig));
         read("joints", joints, n, &mut self.joints)?;
         if let Some(velocity) = velocity {
             read("velocity", velocity, n, &mut self.velocity)?;
@@ -88,14 +94,14 @@ impl Stepper {
                 }
                 Err(_) => (goal.cast::<Task>()?.try_borrow()?, 0, 1.0),
             });
-            borrowed.last().map_or(Ok(()), |(task, ..)| task.fits(n))?;
+            borrowed.last().map_or(Ok(()), |(task, ..)| task.fits(&layout, n))?;
         }
         let goals: Vec<servo::Goal<'_>> = borrowed
             .iter()
             .map(|(task, priority, share)| servo::Goal { task: &task.inner, priority: *priority, share: *share })
             .collect();
-        let limits: Vec<&dyn servo::Limit> =
-            limits.iter().flatten().map(|limit| &limit.get().inner as &dyn servo::Limit).collect();
+        let limits = those_of(limits.as_deref(), &layout, n)?;
+        let limits: Vec<&dyn servo::Limit> = limits.into_iter().map(|limit| limit as &dyn servo::Limit).collect();
         let step = self.inner.step(&self.arm, &self.at, &goals, &limits, dt).clone();
         drop(goals);
         // All of them are taken, so that none is raised by a later step.

@@ -6,6 +6,7 @@ use crate::sight::Layout;
 use handeye::servo::tasks::{self, TipMotion};
 use handeye::servo::{Arm, Configuration, TaskRows};
 use numpy::ndarray::Ix2;
+use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::{Mutex, PoisonError};
@@ -34,6 +35,19 @@ impl handeye::servo::Task for Kind {
             Kind::LookAt(task) => task.rows(arm, at, rows),
             Kind::Manipulability(task) => task.rows(arm, at, rows),
             Kind::Function(function) => function.rows(at, rows),
+        }
+    }
+}
+
+#[pymethods]
+impl Task {
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        if let Kind::Function(function) = &self.inner { visit.call(&function.function) } else { Ok(()) }
+    }
+
+    fn __clear__(&mut self) {
+        if let Kind::Function(function) = &mut self.inner {
+            function.function = None;
         }
     }
 }
@@ -196,13 +210,14 @@ impl FunctionTask {
     #[new]
     #[pyo3(signature = (function, *, sd = 1.0))]
     fn new(function: Py<PyAny>, sd: f64) -> PyResult<PyClassInitializer<Self>> {
-        let function = Function { function, sd: positive("sd", sd)?, raised: Mutex::new(None) };
+        let function = Function { function: Some(function), sd: positive("sd", sd)?, raised: Mutex::new(None) };
         Ok(new(FunctionTask, Kind::Function(function)))
     }
 }
 
 pub struct Function {
-    function: Py<PyAny>,
+    /// `None` where the object is being thrown away.
+    function: Option<Py<PyAny>>,
     sd: f64,
     raised: Mutex<Option<PyErr>>,
 }
@@ -216,7 +231,8 @@ impl Function {
     }
 
     fn add(&self, py: Python<'_>, joints: &[f64], rows: &mut TaskRows) -> PyResult<()> {
-        let given = self.function.call1(py, (crate::arrays::vector(py, joints),))?;
+        let Some(function) = &self.function else { return Ok(()) };
+        let given = function.call1(py, (crate::arrays::vector(py, joints),))?;
         let (change, slopes): (Floats<'_>, Floats<'_>) = given.extract(py)?;
         let n = joints.len();
         let change = list("change", &change, change.as_array().len())?;
@@ -233,12 +249,15 @@ impl Function {
 }
 
 impl Task {
-    /// Whether it is a task of an arm with so many joints.
-    pub fn fits(&self, n_joints: usize) -> PyResult<()> {
+    /// Whether it is a task of an arm with so many joints, before such cameras.
+    pub fn fits(&self, layout: &Layout, n_joints: usize) -> PyResult<()> {
         match &self.inner {
             Kind::JointTarget(task) if task.joints.len() != n_joints => {
                 let found = task.joints.len();
                 Err(unusable(format!("joint target: shape [{found}], and ({n_joints},) would do")))
+            }
+            Kind::ImagePoints(task) => {
+                task.targets.iter().try_for_each(|target| layout.check_has("tasks", target.camera, target.feature))
             }
             _ => Ok(()),
         }

@@ -109,6 +109,7 @@ impl Account<'_> {
             cameras: Vec::new(),
             stages: vec![stage],
             converged,
+            metric: true,
             gauge,
             states: vec![self.states()],
             noise: None,
