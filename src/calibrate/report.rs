@@ -145,7 +145,7 @@ impl Finding {
                  went astray",
                 stated.rounded()
             ),
-Finding::MissedLength { length, learned } => format!(
+            Finding::MissedLength { length, learned } => format!(
                 "{} was measured as {:.2} mm and is {:.2} mm in the learned rig: one of it and the other known lengths is wrong",
                 length.between,
                 1e3 * length.length,

@@ -58,6 +58,35 @@ pub(super) fn groups(images: &[Image], camera: &[u32], within: Option<i64>) -> V
     groups.into_iter().map(group).collect()
 }
 
+/// The moments at which groups need the robot's state [ns], sorted: their own, and of images that are apart each one's.
+pub(super) fn moments(groups: &[Group], images: &[Image]) -> Vec<i64> {
+    let of_images = groups.iter().filter(|group| group.spread > 0).flat_map(|group| &group.images);
+    let mut moments: Vec<i64> = of_images.map(|&index| images[index].stamp).collect();
+    moments.extend(groups.iter().map(|group| group.time));
+    moments.sort_unstable();
+    moments.dedup();
+    moments
+}
+
+/// Takes those groups apart between whose first and last image [ns] the robot `moved`: a sample has one state. Returns how many these were.
+pub(super) fn split(groups: Vec<Group>, images: &[Image], moved: impl Fn(i64, i64) -> bool) -> (Vec<Group>, usize) {
+    let mut count = 0;
+    let mut all = Vec::with_capacity(groups.len());
+    for group in groups {
+        let stamp = |index: &usize| images[*index].stamp;
+        let [first, last] = [group.images.first(), group.images.last()].map(|index| index.map_or(0, stamp));
+        if group.spread == 0 || !moved(first, last) {
+            all.push(group);
+            continue;
+        }
+        count += 1;
+        let at_once = group.images.chunk_by(|one, other| stamp(one) == stamp(other));
+        all.extend(at_once.map(|images| Group { time: stamp(&images[0]), images: images.to_vec(), spread: 0 }));
+    }
+    all.sort_by_key(|group| group.time);
+    (all, count)
+}
+
 /// The smallest median of the times between two images of one camera [ns]; 0 where none has two.
 fn usual_period(images: &[Image], camera: &[u32], order: &[usize]) -> i64 {
     let n_cameras = camera.iter().max().map_or(0, |last| last + 1);

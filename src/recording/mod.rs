@@ -12,6 +12,7 @@ mod jsonl;
 mod names;
 mod open;
 mod order;
+mod same_joints;
 mod select;
 mod table;
 mod track;

@@ -2,6 +2,7 @@
 use super::value::Value;
 use crate::recording::OpenOptions;
 use crate::recording::names::joint_name;
+use crate::recording::same_joints::{Places, places, several};
 
 /// The lists of names in joint states, each once, in the order in which they were first met.
 #[derive(Default)]
@@ -30,8 +31,8 @@ impl JointLists {
 
     /// The only topic of which a state has all joints that are asked for, or that the rig has.
     pub(super) fn topic(&self, options: &OpenOptions) -> Option<&str> {
-        let wanted = wanted(options);
-        let mut with_all = self.0.iter().filter(|list| list.has_all(&wanted)).map(|list| list.topic.as_str());
+        let has_all = |list: &&List| matches!(list.find(options), Places::Found(_));
+        let mut with_all = self.0.iter().filter(has_all).map(|list| list.topic.as_str());
         let first = with_all.next()?;
         with_all.all(|other| other == first).then_some(first)
     }
@@ -39,17 +40,23 @@ impl JointLists {
     /// The joints from base to tip: as asked for, as in the rig where a state has all of those, or else as in the state that has most, of several
     /// the first. Empty where no state has any.
     ///
-    /// Errors: in words, for joints that are asked for and in no state.
+    /// Errors: in words, for joints that are asked for and in no state, and where those of the rig may be others too.
     pub(super) fn order(&self, topic: &str, options: &OpenOptions) -> Result<Vec<String>, String> {
         let lists = || self.0.iter().filter(|list| list.topic == topic);
         let Some(longest) = lists().rev().max_by_key(|list| list.names.len()) else { return Ok(Vec::new()) };
-        let wanted = wanted(options);
-        if lists().any(|list| list.has_all(&wanted)) {
-            return Ok(wanted);
+        let found: Vec<(&List, Places)> = lists().map(|list| (list, list.find(options))).collect();
+        for (list, places) in &found {
+            if let Places::Found(places) = places {
+                return Ok(places.iter().map(|place| list.names[*place].clone()).collect());
+            }
+        }
+        if let Some(first) = found.iter().find_map(|(_, places)| places.several()) {
+            return Err(several(first));
         }
         if options.joints.is_empty() {
             return Ok(longest.names.clone());
         }
+        let wanted = asked_for(options);
         let missing = wanted.iter().find(|joint| lists().all(|list| !list.names.contains(joint)));
         let there = lists().map(|list| list.names.join(", ")).collect::<Vec<_>>().join("; ");
         Err(match missing {
@@ -65,12 +72,16 @@ impl JointLists {
 }
 
 impl List {
-    fn has_all(&self, wanted: &[String]) -> bool {
-        !wanted.is_empty() && wanted.iter().all(|joint| self.names.contains(joint))
+    /// Where the joints are that are asked for, which are called just so, or else those of the rig.
+    fn find(&self, options: &OpenOptions) -> Places {
+        if options.joints.is_empty() {
+            return places(&options.known_joints, &self.names);
+        }
+        let place = |name: &String| self.names.iter().position(|known| known == name);
+        asked_for(options).iter().map(place).collect::<Option<_>>().map_or(Places::Missing, Places::Found)
     }
 }
 
-fn wanted(options: &OpenOptions) -> Vec<String> {
-    let names = if options.joints.is_empty() { &options.known_joints } else { &options.joints };
-    names.iter().map(|name| joint_name(name)).collect()
+fn asked_for(options: &OpenOptions) -> Vec<String> {
+    options.joints.iter().map(|name| joint_name(name)).collect()
 }

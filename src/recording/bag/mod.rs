@@ -15,8 +15,9 @@ mod states;
 mod topics;
 mod value;
 
-use super::groups::{Group, groups, samples};
+use super::groups::{Group, groups, moments, samples, split};
 use super::order::note_on_others;
+use super::same_joints::are_those;
 use super::track::At;
 use super::{OpenOptions, Opened, Recording};
 use crate::Error;
@@ -122,7 +123,7 @@ pub(super) fn read<'a>(
         None if joint_topic.is_some() || of_bag.frames.is_some() => None,
         named => choose(topics, Kind::Pose, named.as_deref(), "--pose-topic", path)?,
     };
-    let moments: Vec<i64> = groups.iter().map(|group| group.time).collect();
+    let moments = moments(&groups, &images.images);
     let mut states = States::new(path, options, &moments, [joint_topic, pose_topic], &joint_names);
     if joint_topic.is_some() || pose_topic.is_some() || of_bag.frames.is_some() {
         messages::visit(&files, &mut states)?;
@@ -136,13 +137,32 @@ pub(super) fn read<'a>(
         None => states.poses.at(&moments),
     };
     let joints = states.joints.at(&moments);
+    let place = |time: i64| moments.binary_search(&time).ok();
+    let moved = |first: i64, last: i64| {
+        let (Some(first), Some(last)) = (place(first), place(last)) else { return false };
+        let joints = joints[first].as_ref().zip(joints[last].as_ref());
+        let poses = poses[first].as_ref().zip(poses[last].as_ref());
+        joints.is_some_and(|(one, other)| one.value.iter().zip(&other.value).any(|(a, b)| (a - b).abs() > STILL))
+            || poses.is_some_and(|(one, other)| {
+                let shift = other.value.translation - one.value.translation;
+                one.value.angle_to(&other.value) > STILL || shift.norm() > STILL
+            })
+    };
+    let (groups, apart) = match of_bag.join {
+        Some(_) => (groups, 0),
+        None => split(groups, &images.images, moved),
+    };
+    let places: Vec<usize> = groups.iter().filter_map(|group| place(group.time)).collect();
+    let (mut joints, mut poses) = (joints, poses);
+    let joints: Vec<_> = places.iter().map(|&place| joints[place].take()).collect();
+    let poses: Vec<_> = places.iter().map(|&place| poses[place].take()).collect();
     notes.append(&mut of_cameras);
-    notes.extend(note_on_groups(&groups));
+    notes.extend(note_on_groups(&groups, apart));
     if joint_topic.is_some() {
-        notes.extend(note_on_states("joint states", &joints, states.joints.span(), &moments));
+        notes.extend(note_on_states("joint states", &joints, states.joints.span()));
     }
     if pose_topic.is_some() || of_bag.frames.is_some() {
-        notes.extend(note_on_states("tip poses", &poses, states.poses.span(), &moments));
+        notes.extend(note_on_states("tip poses", &poses, states.poses.span()));
     }
     for (number, what) in [
         (states.skipped, "joint states lack a joint or a position, and are left out"),
@@ -153,7 +173,7 @@ pub(super) fn read<'a>(
         }
     }
     notes.extend(note_on_others(images.joints.all(), &joint_names));
-    if options.joints.is_empty() && !joint_names.is_empty() && joint_names != options.known_joints {
+    if options.joints.is_empty() && !joint_names.is_empty() && !are_those(&options.known_joints, &joint_names) {
         let order = joint_names.join(", ");
         notes.push(format!(
                 "joints are in the order of the first joint state: {order}; where that is not from base to tip, give a rig with these names or --joints"
@@ -172,12 +192,24 @@ pub(super) fn read<'a>(
     Ok(Opened { recording: recording.checked_as(&file)?, notes, images: Vec::new() })
 }
 
-fn note_on_groups(groups: &[Group]) -> Option<String> {
-    let spread = groups.iter().map(|group| group.spread).max().filter(|spread| *spread > 0)?;
-    Some(format!("images that make one sample are up to {:.6} s apart", spread as f64 / 1e9))
+/// A robot that moves by less between two images stands still [rad, m]: a tenth of a pixel or so.
+const STILL: f64 = 2e-4;
+
+fn note_on_groups(groups: &[Group], apart: usize) -> Vec<String> {
+    let spread = groups.iter().map(|group| group.spread).max().filter(|spread| *spread > 0);
+    let spread =
+        spread.map(|spread| format!("images that make one sample are up to {:.6} s apart", spread as f64 / 1e9));
+    let apart = (apart > 0).then(|| {
+        format!(
+            "{apart} times the robot moved by more than {} mrad or mm from one camera's image to the next, so that each is a sample of its own \
+             (--join S would have one of all within S seconds)",
+            1e3 * STILL
+        )
+    });
+    spread.into_iter().chain(apart).collect()
 }
 
-fn note_on_states<T>(what: &str, found: &[Option<At<T>>], span: Option<[i64; 2]>, moments: &[i64]) -> Vec<String> {
+fn note_on_states<T>(what: &str, found: &[Option<At<T>>], span: Option<[i64; 2]>) -> Vec<String> {
     let mut notes = Vec::new();
     let largest = found.iter().flatten().map(|at| at.gap).max().unwrap_or(0);
     if largest > 0 {
@@ -188,7 +220,7 @@ fn note_on_states<T>(what: &str, found: &[Option<At<T>>], span: Option<[i64; 2]>
         let within = span.map_or_else(String::new, |[first, last]| {
             format!(", which go from {:.6} s to {:.6} s", first as f64 / 1e9, last as f64 / 1e9)
         });
-        notes.push(format!("{missing} of {} samples are outside the {what}{within}, and have none", moments.len()));
+        notes.push(format!("{missing} of {} samples are outside the {what}{within}, and have none", found.len()));
     }
     notes
 }

@@ -5,6 +5,7 @@ use crate::error::suggestion;
 use crate::recording::OpenOptions;
 use crate::recording::names::joint_name;
 use crate::recording::order::note_on_others;
+use crate::recording::same_joints::are_those;
 
 /// What the options name and the table does not have.
 pub(super) fn without_effect(columns: &Columns, options: &OpenOptions) -> Option<String> {
@@ -68,7 +69,7 @@ pub(super) fn note_on_columns(columns: &Columns, options: &OpenOptions, left_out
         ));
     }
     notes.extend(note_on_others(&columns.named_joints, &columns.joint_names));
-    let is_given = !options.joints.is_empty() || columns.joint_names == options.known_joints;
+    let is_given = !options.joints.is_empty() || are_those(&options.known_joints, &columns.joint_names);
     if !columns.joints.is_empty() && !is_given {
         notes.push(format!(
             "joints are in the order of the columns: {}; where that is not from base to tip, give a rig with these names or --joints",
