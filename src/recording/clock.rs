@@ -19,6 +19,11 @@ pub(crate) fn unit_of_date(number: f64) -> Option<(&'static str, f64)> {
     UNITS.iter().find(|(_, _, seconds)| DATES.contains(&(number * seconds))).map(|(name, _, seconds)| (*name, *seconds))
 }
 
+/// What a unit of so many seconds is called.
+pub(super) fn name_of_unit(seconds: f64) -> &'static str {
+    UNITS.iter().find(|(_, _, unit)| *unit == seconds).map_or("units", |(name, ..)| name)
+}
+
 /// True where most times are a quarter of an hour or more after the one before: a clock that counts since its start was taken for a date.
 pub(crate) fn are_far_apart(times: impl Iterator<Item = f64>) -> bool {
     const FAR: f64 = 900.0;

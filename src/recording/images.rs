@@ -115,7 +115,7 @@ fn times(images: &[ImageSeen]) -> Result<Vec<i64>, String> {
     let time = |image: &ImageSeen| {
         let seconds = image.time.ok_or_else(|| {
             let name = &image.name;
-            format!("the name of image `{name}` is no time, in seconds or as a count of ms, µs or ns since 1970 as all others are")
+            format!("the name of image `{name}` is no time, in seconds or as a count of ms, µs or ns since 1970 as all others are; by order or name they might pair")
         })?;
         Ok((seconds * 1e9) as i64)
     };

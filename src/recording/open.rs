@@ -43,11 +43,11 @@ impl Format {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct OpenOptions {
     /// Names of the joints from base to tip, some of those in the file; empty: `known_joints`, or all in the order of the file's columns or of
-    /// its first joint state.
+    /// the first joint state that has most.
     pub joints: Vec<String>,
-    /// Names that the joints have where the file has all of them, as those of a rig.
+    /// Names that the joints have where the file has all of them, as those of a rig: others are left out, as those of a gripper.
     pub known_joints: Vec<String>,
-    /// What is known of cameras, by name: a lens replaces what the file says of it, a size has to be that of the images.
+    /// What is known of cameras, by name: a lens replaces what the file says of it, a size has to be that of the images, or of the CameraInfo.
     pub cameras: Vec<RecordedCamera>,
     /// Of bags.
     pub bag: BagOptions,

@@ -165,6 +165,10 @@ impl Visitor for Images<'_> {
                 self.images.push(Image { stamp, source, features: seen.as_slice().to_vec() });
             }
             Some(Kind::JointStates) => {
+                if topic.decode_head(data, |state| self.joints.has(&topic.name, state)) == Some(true) {
+                    return Ok(());
+                }
+                // What cannot be read is told by whoever needs it.
                 let _ = topic.decode(self.path, time, data, |state| {
                     self.joints.add(&topic.name, state);
                     Ok(())

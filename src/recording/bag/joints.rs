@@ -1,5 +1,5 @@
 //! Which joints the states of a bag name: those of an arm and of its gripper may come on one topic or on two.
-use super::value::Value;
+use super::value::{Texts, Value};
 use crate::recording::OpenOptions;
 use crate::recording::names::joint_name;
 use crate::recording::same_joints::{Places, places, several};
@@ -16,10 +16,16 @@ struct List {
 }
 
 impl JointLists {
-    /// Takes the names of a state; one without positions says nothing of joints, and what cannot be read is told by whoever needs it.
+    /// True where the names of a state are known, of which nothing else needs to be read.
+    pub(super) fn has(&self, topic: &str, state: &Value) -> bool {
+        let is_same = |names: Texts| self.0.iter().any(|list| list.topic == topic && list.bytes == names.bytes);
+        state.texts("name").is_some_and(is_same)
+    }
+
+    /// Takes the names of a state that are not known; one without positions says nothing of joints.
     pub(super) fn add(&mut self, topic: &str, state: &Value) {
         let (Some(names), Some(positions)) = (state.texts("name"), state.numbers("position")) else { return };
-        if positions.is_empty() || self.0.iter().any(|list| list.topic == topic && list.bytes == names.bytes) {
+        if positions.is_empty() {
             return;
         }
         let bytes = names.bytes.to_vec();

@@ -12,7 +12,7 @@ pub(super) struct Topic {
     pub type_name: String,
     pub kind: Option<Kind>,
     layout: Result<Layout, String>,
-    /// Of the header alone, where whole messages need not be looked at.
+    /// Of what tells whether a message says again what was said before, where whole messages need not be looked at.
     head: Option<Layout>,
     pub messages: usize,
 }
@@ -28,12 +28,17 @@ impl Topic {
                 Err(format!("has a schema in `{schema}` and messages in `{message}`, and `ros2msg` and `cdr` are read"))
             }
         };
-        let is_repeated = kind == Some(Kind::CameraInfo) && layout.is_ok();
-        let head = is_repeated.then(|| Layout::new(&type_name, &definition, &["header.frame_id"]).ok()).flatten();
+        let of_head = match kind {
+            Some(Kind::CameraInfo) => Some("header.frame_id"),
+            Some(Kind::JointStates) => Some("name"),
+            _ => None,
+        };
+        let head = of_head.filter(|_| layout.is_ok());
+        let head = head.and_then(|field| Layout::new(&type_name, &definition, &[field]).ok());
         Topic { name: topic, type_name, kind, layout, head, messages: 0 }
     }
 
-    /// What `take` makes of a message's header; `None` where it cannot be read by itself.
+    /// What `take` makes of a message's head; `None` where it cannot be read by itself.
     pub(super) fn decode_head<T>(&self, data: &[u8], take: impl FnOnce(&Value) -> T) -> Option<T> {
         Value::decode(self.head.as_ref()?, data).ok().map(|value| take(&value))
     }

@@ -4,7 +4,7 @@ use super::remarks::{note_on_columns, nothing, without_effect};
 use super::{Actions, Angles, Rows};
 use crate::Error;
 use crate::geometry::orientation;
-use crate::recording::clock::{LATEST, are_far_apart, unit_of_date};
+use crate::recording::clock::{LATEST, are_far_apart, name_of_unit, unit_of_date};
 use crate::recording::names::joint_name;
 use crate::recording::{
     Detection, OpenOptions, Opened, PointDetection, RecordedCamera, Recording, Sample, TargetDetection,
@@ -60,9 +60,10 @@ pub(super) fn read(mut rows: impl Rows, options: &OpenOptions, cameras: &[Record
     let is_far = is_guessed && are_far_apart(samples.iter().filter_map(|sample| sample.time));
     if is_far && let Some(unit) = unit.filter(|unit| *unit != 1.0) {
         return Err(Error::Unusable(format!(
-            "{}: times would be dates since 1970 in steps of {unit} s, and most rows a quarter of an hour or more apart: a clock that counts since \
-             its start needs a column `time_ms`, `time_us` or `time_ns`, which says its unit",
-            rows.file()
+            "{}: as {} since 1970 most times would be a quarter of an hour or more apart; of a clock that counts since its start, a column `time_ms`, \
+             `time_us` or `time_ns` says the unit",
+            rows.file(),
+            name_of_unit(unit)
         )));
     }
     if is_far || (farthest > DAY && unit.is_none_or(|unit| unit == 1.0)) {
