@@ -46,7 +46,7 @@ fn length(honest: &Honest<'_>, [ahead, behind]: &[Model; 2], sd: Option<f64>) ->
     }
     let (change, what) = best?;
     Some(format!(
-        "measure {what} (a [[estimate.lengths]] of the rig file): it is known to {:.1} mm along this",
+        "measure {what} (--length, or [[estimate.lengths]] in the rig file): it is known to {:.1} mm along this",
         1e3 * change
     ))
 }

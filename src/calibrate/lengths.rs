@@ -4,10 +4,11 @@ use super::graph::{Built, State};
 use super::setup::Setup;
 use crate::Error;
 use crate::factors::{OriginDistance, PointDistance};
-use crate::rig::{Ends, Length, Model, Rig};
+use crate::rig::{Ends, Feature, Length, Model, Rig};
 use handeye_solvers::Loss;
+use std::f64::consts::SQRT_2;
 
-/// A length whose ends are found: two features or two cameras, by index.
+/// The ends of a length, found: two features or two cameras, by index.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Found {
     Features([usize; 2]),
@@ -20,11 +21,10 @@ const MISSED: f64 = 3.0;
 impl Found {
     /// Errors: [`Error::Unusable`] where neither rig nor recording has one of the ends, or their distance is none of the rig's.
     pub fn new(rig: &Rig, length: &Length) -> Result<Found, Error> {
-        let features: Vec<_> = rig.features.iter().map(|feature| (feature.name.as_str(), feature.parent)).collect();
-        let cameras: Vec<_> = rig.cameras.iter().map(|camera| (camera.name.as_str(), camera.parent)).collect();
-        let (known, of): (_, fn([usize; 2]) -> Found) = match length.between {
-            Ends::Features(_) => (features, Found::Features),
-            Ends::Cameras(_) => (cameras, Found::Cameras),
+        let known = length.between.among(rig);
+        let of: fn([usize; 2]) -> Found = match length.between {
+            Ends::Features(_) => Found::Features,
+            Ends::Cameras(_) => Found::Cameras,
         };
         let (_, names) = length.between.parts();
         let index = |end: &String| known.iter().position(|(name, _)| name == end);
@@ -44,14 +44,53 @@ impl Found {
     }
 }
 
-fn all(setup: &Setup) -> impl Iterator<Item = (&Length, Found)> {
-    setup.rig.estimate.lengths.iter().zip(setup.lengths.iter().copied())
+/// Everything that was measured, with its ends.
+///
+/// Errors: those of [`Found::new`], and [`Error::Unusable`] where the side of tags is given and there are none.
+pub(crate) fn find(rig: &Rig) -> Result<Vec<(Length, Found)>, Error> {
+    let given = rig.estimate.lengths.iter().map(|length| Ok((length.clone(), Found::new(rig, length)?)));
+    let mut found: Vec<(Length, Found)> = given.collect::<Result<_, Error>>()?;
+    if let Some(side) = rig.estimate.tag_side {
+        let before = found.len();
+        let tags = (0..rig.features.len()).filter_map(|first| corners(rig, first));
+        found.extend(tags.flat_map(|tag| sides_and_diagonals(rig, tag, side)));
+        if found.len() == before {
+            return Err(Error::Unusable(
+                "`tag_side` of [estimate]: no tag has its four corners, FAMILY:ID/0 to FAMILY:ID/3, among the features"
+                    .to_owned(),
+            ));
+        }
+    }
+    Ok(found)
+}
+
+/// The corners of the tag whose first one this feature is.
+fn corners(rig: &Rig, first: usize) -> Option<[usize; 4]> {
+    let Feature { name, parent, .. } = &rig.features[first];
+    let tag = name.strip_suffix("/0")?;
+    let (_, number) = tag.rsplit_once(':')?;
+    number.parse::<u64>().ok()?;
+    let place = |corner: usize| {
+        let name = format!("{tag}/{corner}");
+        rig.features.iter().position(|feature| feature.name == name && feature.parent == *parent)
+    };
+    Some([first, place(1)?, place(2)?, place(3)?])
+}
+
+fn sides_and_diagonals(rig: &Rig, tag: [usize; 4], side: f64) -> impl Iterator<Item = (Length, Found)> {
+    let pairs = (0..4).flat_map(move |one| (one + 1..4).map(move |other| [one, other]));
+    pairs.map(move |[one, other]| {
+        let ends = [tag[one], tag[other]];
+        let between = Ends::Features(ends.map(|feature| rig.features[feature].name.clone()));
+        let length = if other - one == 2 { SQRT_2 * side } else { side };
+        (Length { between, length, sd: Length::RULER }, Found::Features(ends))
+    })
 }
 
 /// What all lengths of a state have to be multiplied by so that those that were measured come out best; `None` where none was.
 pub(crate) fn scale(setup: &Setup, state: &State) -> Option<f64> {
     let (mut wanted, mut now) = (0.0, 0.0);
-    for (length, found) in all(setup) {
+    for (length, found) in &setup.lengths {
         let weighted = found.now(&state.model) / length.sd;
         (wanted, now) = (wanted + weighted * length.length / length.sd, now + weighted * weighted);
     }
@@ -61,7 +100,7 @@ pub(crate) fn scale(setup: &Setup, state: &State) -> Option<f64> {
 
 /// Adds a factor for each.
 pub(crate) fn measure(setup: &Setup, loss: Loss, built: &mut Built) {
-    for (&Length { length, sd, .. }, found) in all(setup) {
+    for &(Length { length, sd, .. }, found) in &setup.lengths {
         match found {
             Found::Features([one, other]) => {
                 let on = (built.features[one], built.features[other]);
@@ -77,7 +116,7 @@ pub(crate) fn measure(setup: &Setup, loss: Loss, built: &mut Built) {
 
 /// Those that the learned rig misses.
 pub(crate) fn missed(setup: &Setup, state: &State) -> impl Iterator<Item = Finding> {
-    all(setup).filter_map(|(length, found)| {
+    setup.lengths.iter().filter_map(|(length, found)| {
         let learned = found.now(&state.model);
         ((learned - length.length).abs() > MISSED * length.sd)
             .then(|| Finding::MissedLength { length: length.clone(), learned })

@@ -120,10 +120,9 @@ pub fn calibrate(
     observer: Observer<'_>,
 ) -> Result<Calibration, Error> {
     if is_of_targets(recording) {
-        if !rig.estimate.lengths.is_empty() {
+        if !rig.estimate.lengths.is_empty() || rig.estimate.tag_side.is_some() {
             return Err(Error::Unusable(
-                "`lengths` of [estimate] are measured between features or between cameras, and this is a recording of targets"
-                    .to_owned(),
+                "`lengths` and `tag_side` of [estimate] are of features and cameras, and this is a recording of targets".to_owned(),
             ));
         }
         return targets::calibrate_targets(rig, recording, options, observer);

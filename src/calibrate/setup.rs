@@ -1,14 +1,14 @@
 //! What is known and what was measured, side by side: the rig completed by the recording's header, and its observations.
 use super::cameras::{KnownIntrinsics, complete_camera, leave_out_unseen_cameras};
 use super::evaluate::Correspondence;
-use super::lengths::Found;
+use super::lengths::{self, Found};
 use super::observation::{Kind, Observation, Place};
 use super::states::States;
 use crate::Error;
 use crate::camera::{CameraModel, PARAMETERS};
 use crate::chain::LINK_PARAMETERS;
 use crate::recording::{Recording, Sample};
-use crate::rig::{Camera, Feature, Joint, Model, ModelCamera, ModelFeature, Parameter, Parent, Rig};
+use crate::rig::{Camera, Feature, Joint, Length, Model, ModelCamera, ModelFeature, Parameter, Parent, Rig};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
 
@@ -27,8 +27,8 @@ pub(crate) struct Setup {
     pub samples: Vec<usize>,
     /// Every detection of a sample that takes part, sample by sample; pixels before points.
     pub observations: Vec<Observation>,
-    /// Ends of the rig's measured lengths, in their order.
-    pub lengths: Vec<Found>,
+    /// What was measured of the rig, with its ends.
+    pub lengths: Vec<(Length, Found)>,
     /// Names of cameras that are left out: their poses are unknown, and no sample with joints has a detection of theirs.
     pub unseen: Vec<String>,
 }
@@ -72,8 +72,7 @@ impl Setup {
         if observations.is_empty() {
             return Err(Error::NotEnoughData("no sample has a detected feature".into()));
         }
-        let lengths =
-            rig.estimate.lengths.iter().map(|length| Found::new(&rig, length)).collect::<Result<_, Error>>()?;
+        let lengths = lengths::find(&rig)?;
         Ok(Setup { rig, model, intrinsics, states, samples, observations, lengths, unseen })
     }
 

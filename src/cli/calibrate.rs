@@ -16,7 +16,7 @@ use handeye::calibrate::{
 };
 use handeye::recording::Recording;
 use handeye::report;
-use handeye::rig::{Rig, files_named};
+use handeye::rig::{Ends, Length, Rig, files_named};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -32,6 +32,7 @@ Examples:
   handeye calibrate motions.jsonl --rig ur5 -o learned.toml --folds 5   with held-out errors
   handeye calibrate motions.jsonl --rig arm.toml -o arm.toml            keeps its comments
   handeye calibrate motions.jsonl -o learned.toml --report page.html    a page to read
+  handeye calibrate robot.mcap --rig ur5e --tag-side 0.06 -o arm.toml   tags that tell how large everything is
   handeye calibrate three.jsonl --rig arm.toml --relearn cameras.left -o arm.toml   a camera that was moved
   handeye calibrate five.jsonl --rig arm.toml --relearn cameras.top -o arm.toml     a camera that is new
   handeye calibrate two.jsonl --rig arm.toml --relearn 'features.tool*' -o arm.toml another object in the gripper")]
@@ -61,6 +62,12 @@ pub struct Calibrate {
     /// Pick the noise of joints or poses, relative to that of pixels, by how well samples held out are predicted
     #[arg(long, conflicts_with = "estimate_noise")]
     select_noise: bool,
+    /// A distance that was measured between two features or two cameras [m], to 0.5 mm; may be given more than once
+    #[arg(long, value_name = "A,B=METRES", value_parser = read_length)]
+    length: Vec<Length>,
+    /// The side of all tags whose corners are features [m], to 0.5 mm
+    #[arg(long, value_name = "METRES", value_parser = metres)]
+    tag_side: Option<f64>,
     /// Seed of every random choice: the same seed gives the same rig
     #[arg(long, value_name = "S", default_value_t = Options::default().seed)]
     seed: u64,
@@ -72,6 +79,18 @@ pub struct Calibrate {
     threads: Option<u16>,
     #[command(flatten)]
     reading: Reading,
+}
+
+/// `features.A,features.B=0.12`
+fn read_length(text: &str) -> Result<Length, String> {
+    let (between, length) = text.split_once('=').ok_or("expected A,B=METRES, as features.f0,features.f7=0.12")?;
+    let (one, other) = between.split_once(',').ok_or("expected two ends, as features.f0,features.f7=0.12")?;
+    Ok(Length { between: Ends::new([one, other])?, length: metres(length)?, sd: Length::RULER })
+}
+
+fn metres(text: &str) -> Result<f64, String> {
+    let metres = text.parse::<f64>().ok().filter(|metres| *metres > 0.0 && metres.is_finite());
+    metres.ok_or_else(|| "expected a length above 0, in metres".to_owned())
 }
 
 impl Calibrate {
@@ -90,6 +109,8 @@ impl Calibrate {
             }
         }
         let (mut rig, text) = input.map_or_else(|| (Rig::default(), None), |input| (input.rig, Some(input.text)));
+        rig.estimate.lengths.extend(self.length.iter().cloned());
+        rig.estimate.tag_side = self.tag_side.or(rig.estimate.tag_side);
         let options = Options { seed: self.seed, estimate_noise: self.estimate_noise, influence: self.influence };
         let bar = Bar::new(is_json);
         let (trials, folds, calibration, suggestion, seconds) = on_threads(self.threads, || {

@@ -175,6 +175,9 @@ fn describe(rig: &Rig, file: &str, counts: &Counts) -> String {
     if !targets.is_empty() {
         text += &format!("  targets   {}: {}\n", targets.len(), list(&targets));
     }
+    if let Some(side) = rig.estimate.tag_side {
+        text += &format!("  measured  the sides of tags: {:.2} mm\n", 1e3 * side);
+    }
     for length in &rig.estimate.lengths {
         let (mm, sd) = (1e3 * length.length, 1e3 * length.sd);
         text += &format!("  measured  {}: {mm:.2} ± {sd:.2} mm\n", length.between);

@@ -72,7 +72,8 @@ impl Detect {
         if let Some(bag) = self.states.as_deref().filter(is_bag) {
             let bag = bag.display();
             return Err(Error::Unusable(format!(
-                "--states {bag}: a bag says where the robot was at the stamps of its own images, which `handeye detect {bag}` looks at; for images                  in folders a table or a recording (JSON Lines) says it"
+                "--states {bag}: a bag says where the robot was at the stamps of its own images, which `handeye detect {bag}` looks at; for images \
+                 in folders a table or a recording (JSON Lines) says it"
             )));
         }
         let images = self.images.iter().map(Path::new);

@@ -216,6 +216,8 @@ pub struct Estimate {
     pub prior: BTreeMap<String, f64>,
     /// Distances that were measured.
     pub lengths: Vec<Length>,
+    /// Side of all tags whose corners are features, `FAMILY:ID/0` to `/3` around the tag [m]; known as well as [`Length::RULER`] says.
+    pub tag_side: Option<f64>,
 }
 
 /// A distance that was measured, with a ruler or on a drawing.
@@ -229,6 +231,11 @@ pub struct Length {
     pub sd: f64,
 }
 
+impl Length {
+    /// Standard deviation of what a ruler or a drawing tells [m].
+    pub const RULER: f64 = 5e-4;
+}
+
 /// The ends of a [`Length`], by name; both are fixed to the same thing.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Ends {
@@ -239,11 +246,30 @@ pub enum Ends {
 }
 
 impl Ends {
+    /// By their paths: `features.A` and `features.B`, or two `cameras`.
+    ///
+    /// Errors: in words, where they are neither.
+    pub fn new([one, other]: [&str; 2]) -> Result<Ends, String> {
+        let both = |prefix: &str| Some([one.strip_prefix(prefix)?.to_owned(), other.strip_prefix(prefix)?.to_owned()]);
+        let features = both("features.").map(Ends::Features);
+        features.or_else(|| both("cameras.").map(Ends::Cameras)).ok_or_else(|| {
+            format!("is between two features or two cameras, as in [\"features.A\", \"features.B\"], found `{one}` and `{other}`")
+        })
+    }
+
     /// The word for what they are, and their names.
     pub fn parts(&self) -> (&'static str, &[String; 2]) {
         match self {
             Ends::Features(names) => ("features", names),
             Ends::Cameras(names) => ("cameras", names),
+        }
+    }
+
+    /// The features or cameras of a rig, with what these are fixed to.
+    pub(crate) fn among<'a>(&self, rig: &'a Rig) -> Vec<(&'a str, Parent)> {
+        match self {
+            Ends::Features(_) => rig.features.iter().map(|feature| (feature.name.as_str(), feature.parent)).collect(),
+            Ends::Cameras(_) => rig.cameras.iter().map(|camera| (camera.name.as_str(), camera.parent)).collect(),
         }
     }
 

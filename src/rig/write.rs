@@ -148,6 +148,12 @@ fn write_estimate(table: &mut dyn TableLike, before: &Estimate, now: &Estimate) 
         table.remove("prior");
         table.insert("prior", Item::Table(prior));
     }
+    if before.tag_side != now.tag_side {
+        match now.tag_side {
+            Some(side) => set(table, "tag_side", number(side)),
+            None => drop(table.remove("tag_side")),
+        }
+    }
     if before.lengths != now.lengths {
         let lengths: Array = now.lengths.iter().map(length).collect();
         set(table, "lengths", Value::Array(lengths));

@@ -168,21 +168,23 @@ pub fn images_beside(n: u64, others: &[(&str, &str, String, u64, Vec<u8>)]) -> V
         let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
         writer.write_to_known_channel(&header, data).unwrap();
     };
-    let tags = format!("{HEADER}{TAGS}{HEADER_PARTS}{TAGS_PARTS}");
-    for index in 0..n {
-        let stamp = 1_000_000_000 + EVERY * index;
-        let mut cdr = Cdr::stamped(stamp, "left");
-        cdr.int(1);
-        cdr.text("tag36h11");
-        (0..4).for_each(|_| cdr.int(0));
-        (0..19).for_each(|number| cdr.float(f64::from(number)));
-        write("/left/tags", "apriltag_msgs/msg/AprilTagDetectionArray", &tags, stamp, &cdr.bytes);
-    }
-    for (topic, kind, text, time, data) in others {
+    let images = (0..n).map(|index| image("/left/tags", "left", 1_000_000_000 + EVERY * index));
+    for (topic, kind, text, time, data) in images.collect::<Vec<_>>().iter().chain(others) {
         write(topic, kind, text, *time, data);
     }
     writer.finish().unwrap();
     writer.into_inner().into_inner()
+}
+
+/// An image of one tag: topic, type, schema, time [ns] and bytes.
+pub fn image(topic: &'static str, frame: &str, stamp: u64) -> (&'static str, &'static str, String, u64, Vec<u8>) {
+    let mut cdr = Cdr::stamped(stamp, frame);
+    cdr.int(1);
+    cdr.text("tag36h11");
+    (0..4).for_each(|_| cdr.int(0));
+    (0..19).for_each(|number| cdr.float(f64::from(number)));
+    let text = format!("{HEADER}{TAGS}{HEADER_PARTS}{TAGS_PARTS}");
+    (topic, "apriltag_msgs/msg/AprilTagDetectionArray", text, stamp, cdr.bytes)
 }
 
 /// A pose: origin, then the quaternion of a turn about z.

@@ -1,7 +1,7 @@
 //! The joints of an arm in bags in which a gripper's come too.
-use crate::bag::{HEADER, HEADER_PARTS, JOINTS, images_beside, joint_state, read_with};
+use crate::bag::{HEADER, HEADER_PARTS, JOINTS, image, images_beside, joint_state, read_with};
 use crate::cli::Folder;
-use handeye::recording::{OpenOptions, Opened};
+use handeye::recording::{BagOptions, OpenOptions, Opened};
 
 type Message = (&'static str, &'static str, String, u64, Vec<u8>);
 
@@ -141,4 +141,61 @@ fn states_of_an_arm_and_a_gripper_on_one_topic_are_told_apart_and_those_without_
         assert!((a - seconds).abs() < 1e-9 && (b - 0.5 * seconds).abs() < 1e-9, "{a} {b} at {seconds}");
     }
     assert!(notes.iter().any(|note| note.contains("10 joint states lack a joint or a position")), "{notes:?}");
+}
+
+/// Names within a driver's prefix and suffix, in the driver's order, as those of a rig's; of two arms neither is taken for the other.
+#[test]
+fn joints_of_a_driver_are_those_of_the_rig_in_the_order_of_the_rig() {
+    let folder = Folder::new("bag-driver");
+    let options = OpenOptions { known_joints: names(["a", "b"]), ..OpenOptions::default() };
+    let of = |joints: [&str; 3]| {
+        let states = messages(|time, seconds| {
+            vec![state("/joint_states", time, &names(joints), &[0.5 * seconds, 7.0, seconds])]
+        });
+        read_with(&images_beside(4, &states), &folder, &options)
+    };
+    let Opened { recording, notes, .. } = of(["left_b_joint", "finger_joint", "left_a_joint"]).unwrap();
+    assert_eq!(recording.joints, ["left_a_joint", "left_b_joint"]);
+    for (index, sample) in recording.samples.iter().enumerate() {
+        let seconds = 1.0 + 0.1 * index as f64;
+        let [a, b] = sample.joints.as_ref().unwrap()[..] else { panic!() };
+        assert!((a - seconds).abs() < 1e-9 && (b - 0.5 * seconds).abs() < 1e-9, "{a} {b} at {seconds}");
+    }
+    assert!(!notes.iter().any(|note| note.contains("--joints")), "{notes:?}");
+    // Neither of the right words nor within the same ones: the rig's names say nothing of these.
+    assert_eq!(of(["left_b", "finger", "right_a"]).unwrap().recording.joints.len(), 3);
+    let both = messages(|time, seconds| {
+        let arms = names(["left_a", "left_b", "right_a", "right_b"]);
+        vec![state("/joint_states", time, &arms, &[seconds, 0.5 * seconds, 0.0, 0.0])]
+    });
+    let error = read_with(&images_beside(4, &both), &folder, &options).unwrap_err().to_string();
+    assert!(error.contains("left_a or right_a: --joints names those that are meant"), "{error}");
+}
+
+/// Two cameras 20 ms apart, an arm that begins to move at 1.35 s: one joint goes with the time, by 1 rad/s.
+#[test]
+fn images_between_which_the_robot_moved_are_samples_of_their_own_with_the_joints_of_their_own_time() {
+    let folder = Folder::new("bag-moving");
+    let angle = |seconds: f64| (seconds - 1.35).max(0.0);
+    let mut beside: Vec<Message> = (0..90)
+        .map(|index| 950_000_000 + 10_000_000 * index)
+        .map(|time| state("/joint_states", time, &names(["a"]), &[angle(time as f64 / 1e9)]))
+        .collect();
+    beside.extend((0..8).map(|index| image("/right/tags", "right", 1_020_000_000 + 100_000_000 * index)));
+    let bytes = images_beside(8, &beside);
+    let Opened { recording, notes, .. } = read_with(&bytes, &folder, &OpenOptions::default()).unwrap();
+    // At 1.0, 1.1, 1.2 and 1.3 s it stood still.
+    assert_eq!(recording.samples.len(), 4 + 2 * 4);
+    for (index, sample) in recording.samples.iter().enumerate() {
+        let [first, last] = [sample.pixels.first(), sample.pixels.last()].map(|seen| seen.unwrap().camera);
+        assert_eq!(first == last, index >= 4, "sample {index}");
+        let (time, read) = (sample.time.unwrap(), sample.joints.as_ref().unwrap()[0]);
+        let expected = if index < 4 { 1.01 + 0.1 * index as f64 } else { 1.4 + 0.1 * ((index - 4) / 2) as f64 };
+        let later = if index >= 4 { 0.02 * f64::from(first) } else { 0.0 };
+        assert!((time - expected - later).abs() < 1e-9 && (read - angle(time)).abs() < 1e-9, "{index}: {time} {read}");
+    }
+    assert!(notes.iter().any(|note| note.starts_with("4 times the robot moved")), "{notes:?}");
+    let bag = BagOptions { join: Some(0.03), ..BagOptions::default() };
+    let joined = read_with(&bytes, &folder, &OpenOptions { bag, ..OpenOptions::default() }).unwrap().recording;
+    assert_eq!(joined.samples.len(), 8);
 }

@@ -7,7 +7,7 @@ fn a_name_that_is_not_shipped_is_told_with_the_nearest_and_all() {
     let folder = Folder::new("slips-names");
     folder.write("rec.jsonl", "");
     for (arguments, expected) in [
-        ("check ur3", "error: ur3: neither a rig file nor a shipped rig (did you mean `ur3e`? known: ur5, ur3e, "),
+        ("check ur3", "error: ur3: neither a rig file nor a shipped rig (did you mean `ur3e`? known: ur5, ur5_arm, "),
         ("check ur3e.toml", "error: ur3e.toml: neither a rig file nor a shipped rig (did you mean `ur3e`? known: "),
         ("check hexapod.toml", "error: hexapod.toml: neither a rig file nor a shipped rig (known: ur5, "),
         ("calibrate rec.jsonl --rig ur3 -o x.toml", "error: ur3: neither a rig file nor a shipped rig (did you mean"),

@@ -2,7 +2,7 @@
 use crate::cli::Folder;
 use crate::learning::{learn, nothing, record};
 use handeye::calibrate::{Finding, Report};
-use handeye::rig::{Ends, Length, Rig};
+use handeye::rig::{Ends, Feature, Length, Parent, Rig, catalog};
 use handeye::simulate::random_rig;
 use nalgebra::Vector3;
 
@@ -87,6 +87,46 @@ fn a_length_that_contradicts_what_is_known_is_told() {
         report.findings.iter().any(is_it)
     };
     assert!(told(&wrong) && !told(&right) && report.findings.len() == 1, "{:?}", report.findings);
+}
+
+/// Tags whose side is given tell how large everything is, by file and by option alike.
+#[test]
+fn the_side_of_tags_makes_everything_metric() {
+    let folder = Folder::new("tag-side");
+    let mut rig = catalog::rig("ur5").unwrap();
+    let corners = [[-0.03, -0.03], [0.03, -0.03], [0.03, 0.03], [-0.03, 0.03]];
+    rig.features = (0..12)
+        .map(|index| {
+            let ([x, y], tag) = (corners[index % 4], index / 4);
+            let (name, z) = (format!("tag36h11:{tag}/{}", index % 4), 0.05 + 0.04 * tag as f64);
+            let xyz = if tag == 1 { [x, z, y] } else { [x, y, z] };
+            Feature { name, parent: Parent::Tip, xyz: Some(xyz) }
+        })
+        .collect();
+    folder.write("truth.toml", &rig.to_toml());
+    folder.expect(0, "simulate truth.toml --samples 40 -o rec.jsonl");
+    let (said, _) = folder.expect(0, "calibrate rec.jsonl --tag-side 0.06 -o learned.toml");
+    assert!(!said.contains("nothing metric"), "{said}");
+    let learned = Rig::parse(&folder.read("learned.toml"), "learned.toml").unwrap();
+    assert_eq!(learned.estimate.tag_side, Some(0.06));
+    let length = |rig: &Rig| rig.robot.joints[1].a.unwrap().abs();
+    assert!((length(&learned) / length(&rig) - 1.0).abs() < 0.01, "{} of {}", length(&learned), length(&rig));
+    folder.write("start.toml", "[estimate]\ntag_side = 0.06\n");
+    folder.expect(0, "calibrate rec.jsonl --rig start.toml -o again.toml");
+    let again = Rig::parse(&folder.read("again.toml"), "again.toml").unwrap();
+    assert_eq!((again.robot, again.cameras), (learned.robot, learned.cameras));
+    let edge = "features.tag36h11:0/0,features.tag36h11:0/1=0.06";
+    folder.expect(0, &format!("calibrate rec.jsonl --length {edge} -o by-length.toml"));
+    let by_length = Rig::parse(&folder.read("by-length.toml"), "by-length.toml").unwrap();
+    assert!((length(&by_length) / length(&rig) - 1.0).abs() < 0.02);
+    folder.expect(0, "simulate ur5 --samples 40 -o other.jsonl");
+    let (_, complaint) = folder.expect(2, "calibrate other.jsonl --tag-side 0.06 -o none.toml");
+    assert!(complaint.contains("no tag has its four corners"), "{complaint}");
+    for wrong in
+        ["--length f0,f1=0.1", "--length features.f0=0.1", "--length features.f0,features.f1=-1", "--tag-side 0"]
+    {
+        folder.expect(2, &format!("calibrate other.jsonl {wrong} -o none.toml"));
+    }
 }
 
 #[test]

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 /// Paths are checked against the other parts of the rig, which are complete.
 pub(super) fn read_estimate(node: &Node, rig: &Rig) -> Result<Estimate, Error> {
-    let fields = node.clone().table(&["fixed", "prior", "lengths"])?.labelled("estimate");
+    let fields = node.clone().table(&["fixed", "prior", "lengths", "tag_side"])?.labelled("estimate");
     let fixed = match fields.field("fixed") {
         Some(list) => list.value.list()?,
         None => Vec::new(),
@@ -28,11 +28,9 @@ pub(super) fn read_estimate(node: &Node, rig: &Rig) -> Result<Estimate, Error> {
             Some(list) => list.value.list()?.iter().map(|node| read_length(node, rig)).collect::<Result<_, Error>>()?,
             None => Vec::new(),
         },
+        tag_side: fields.optional("tag_side", Node::positive)?,
     })
 }
-
-/// What a ruler or a drawing tells, where nothing else is said [m].
-const RULER: f64 = 5e-4;
 
 /// `{ between = ["features.A", "features.B"], length = 0.12, sd = 0.0005 }`, or between two cameras.
 fn read_length(node: &Node, rig: &Rig) -> Result<Length, Error> {
@@ -41,7 +39,7 @@ fn read_length(node: &Node, rig: &Rig) -> Result<Length, Error> {
     Ok(Length {
         between: read_ends(&need("between")?.value, rig)?,
         length: need("length")?.value.positive()?,
-        sd: fields.optional("sd", Node::positive)?.unwrap_or(RULER),
+        sd: fields.optional("sd", Node::positive)?.unwrap_or(Length::RULER),
     })
 }
 
@@ -51,18 +49,8 @@ fn read_ends(node: &Node, rig: &Rig) -> Result<Ends, Error> {
     let [one, other] = paths.as_slice() else {
         return Err(node.error(format!("has two ends, as in [\"features.A\", \"features.B\"], found {}", paths.len())));
     };
-    let both = |prefix: &str| Some([one.strip_prefix(prefix)?.to_owned(), other.strip_prefix(prefix)?.to_owned()]);
-    let features: Vec<_> = rig.features.iter().map(|feature| (feature.name.as_str(), feature.parent)).collect();
-    let cameras: Vec<_> = rig.cameras.iter().map(|camera| (camera.name.as_str(), camera.parent)).collect();
-    let (ends, known) = match (both("features."), both("cameras.")) {
-        (Some(names), _) => (Ends::Features(names), features),
-        (None, Some(names)) => (Ends::Cameras(names), cameras),
-        (None, None) => {
-            return Err(node.error(format!(
-                "is between two features or two cameras, as in [\"features.A\", \"features.B\"], found `{one}` and `{other}`"
-            )));
-        }
-    };
+    let ends = Ends::new([one, other]).map_err(|problem| node.error(problem))?;
+    let known = ends.among(rig);
     match ends.problem(&known) {
         Some(problem) if !known.is_empty() => Err(node.error(problem)),
         _ => Ok(ends),
