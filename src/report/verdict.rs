@@ -75,7 +75,7 @@ fn tip(subject: &Subject<'_>) -> String {
         words += &if assumed.is_empty() {
             String::new()
         } else {
-            format!(" What was assumed of what was given: {assumed}.")
+            format!(" What was assumed: {assumed}.")
         };
     }
     words
