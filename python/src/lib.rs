@@ -37,7 +37,9 @@ mod _handeye {
     use crate::infer::{Branch, Inference, Inferred, InferredPose, infer};
     #[pymodule_export]
     use crate::inverse::{InverseKinematics, Reached};
+    #[pymodule_export]
     use crate::minimization::Minimization;
+    #[pymodule_export]
     use crate::node::Node;
     #[pymodule_export]
     use crate::recording::Recording;

@@ -182,7 +182,7 @@ def test_limits_refuse_what_makes_no_sense(ur5):
 def test_limits_and_tasks_of_another_rig_are_refused(ur5, places):
     pixels = ur5.predict(places[0])
     other = handeye.random_rig(6, cameras=3, features=12, seed=1)
-    far = servo.InImage(other, list(other.cameras)[2])
+    far = servo.InImage(other, list(other.predict(np.zeros(6)))[2])
     controller = servo.ImageBased(ur5)
     controller.aim(ur5.predict(places[1]))
     loop = servo.ServoLoop(controller)

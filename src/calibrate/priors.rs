@@ -80,9 +80,15 @@ pub fn assumptions(rig: &Rig, recording: &Recording) -> Vec<String> {
         ("coordinates of image centres", format!("{} of the image", share(CENTRE)), 0),
         ("distortions of lenses", format!("±{DISTORTION} a coefficient"), 0),
         ("places of features", mm(LENGTH), 0),
+        ("focal lengths that are guessed", share(GUESSED_FOCAL), 0),
+        ("coordinates of image centres that are guessed", format!("{} of the image", share(GUESSED_CENTRE)), 0),
     ];
     for parameter in rig.parameters() {
+        let is_given = rig.has_value(&parameter);
         let kind = match parameter {
+            Parameter::CameraField { field: CameraField::Fx | CameraField::Fy, .. } if !is_given => 8,
+            Parameter::CameraField { field: CameraField::Cx | CameraField::Cy, .. } if !is_given => 9,
+            _ if !is_given => continue,
             Parameter::Base => 0,
             Parameter::JointField { field: JointField::D | JointField::A, .. } => 1,
             Parameter::JointField { .. } => 2,
@@ -93,7 +99,7 @@ pub fn assumptions(rig: &Rig, recording: &Recording) -> Vec<String> {
             Parameter::FeatureXyz(_) => 7,
             Parameter::TargetPose(_) => continue,
         };
-        let is_assumed = rig.has_value(&parameter) && !rig.is_fixed(&parameter) && rig.prior_sd(&parameter).is_none();
+        let is_assumed = !rig.is_fixed(&parameter) && rig.prior_sd(&parameter).is_none();
         kinds[kind].2 += usize::from(is_assumed);
     }
     let defaults = kinds.into_iter().filter(|(.., count)| *count > 0).map(|(what, sd, count)| match what {

@@ -199,8 +199,9 @@ fn describe(before: &Rig, recording: &Recording, calibration: &Calibration, seco
     }
     if let Some(tip) = &report.tip {
         text += &format!("\nthe tip's position is known to {tip}\n");
-        if tip.hangs_on_priors() {
-            text += &format!("  what was assumed of what was given: {}\n", assumptions(before, recording).join(", "));
+        let assumed = if tip.hangs_on_priors() { assumptions(before, recording) } else { Vec::new() };
+        if !assumed.is_empty() {
+            text += &format!("  what was assumed: {}\n", assumed.join(", "));
         }
     }
     let cameras = camera_deviations(calibration);

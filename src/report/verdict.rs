@@ -72,11 +72,7 @@ fn tip(subject: &Subject<'_>) -> String {
     let mut words = format!("The tip's position is known to {tip}.");
     if tip.hangs_on_priors() {
         let assumed = assumptions(subject.before, subject.recording).join(", ");
-        words += &if assumed.is_empty() {
-            String::new()
-        } else {
-            format!(" What was assumed of what was given: {assumed}.")
-        };
+        words += &if assumed.is_empty() { String::new() } else { format!(" What was assumed: {assumed}.") };
     }
     words
 }

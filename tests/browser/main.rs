@@ -48,7 +48,7 @@ addEventListener('load', () => {
     overlaps: canvas && canvas.labels.some((a, i) => canvas.labels.slice(i + 1).some((b) =>
       a.x < b.x + b.width && b.x < a.x + a.width && Math.abs(a.y - b.y) < a.height - 1)),
     labels: canvas && canvas.labels.map((label) => label.name).sort(),
-    ratio: devicePixelRatio,
+    ratio: Math.round(1e3 * devicePixelRatio) / 1e3,
     ink: getComputedStyle(document.body).color,
   });
 });

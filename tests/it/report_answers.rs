@@ -182,6 +182,10 @@ fn a_camera_that_was_always_worse_than_the_others_is_not_said_to_be_off() {
     assert!(steps[0].contains("about as well as those that it was learned from"), "{steps:?}");
 }
 
+fn only_size(camera: &RecordedCamera) -> RecordedCamera {
+    RecordedCamera { name: camera.name.clone(), size: camera.size, ..RecordedCamera::default() }
+}
+
 #[test]
 fn a_verdict_says_what_was_assumed_and_what_is_least_known_and_no_more() {
     let truth = catalog::rig("ur5").unwrap();
@@ -212,6 +216,9 @@ fn a_verdict_says_what_was_assumed_and_what_is_least_known_and_no_more() {
     stated.estimate.prior.clear();
     let said = assumptions(&stated, &recording);
     assert!(said[0].starts_with("±10 mm and ±0.02 rad on the pose of the base"), "{said:?}");
+    let sizes = Recording { cameras: recording.cameras.iter().map(only_size).collect(), ..recording.clone() };
+    let unsaid = assumptions(&Rig::default(), &sizes);
+    assert!(unsaid.iter().any(|one| one == "±50 % on each of the 4 focal lengths that are guessed"), "{unsaid:?}");
     // A lens of the recording's header is assumed as one of the rig.
     let no_lens = Rig { cameras: Vec::new(), ..truth };
     let mut headed = recording.clone();
