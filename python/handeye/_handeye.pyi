@@ -303,6 +303,8 @@ def calibrate(
     select_noise: bool = False,
     influence: bool = False,
     seed: int = 1,
+    tag_side: float | None = None,
+    lengths: Sequence[tuple[str, str, float]] | None = None,
     progress: Callable[[Progress], object] | None = None,
     threads: int | None = None,
 ) -> Calibration: ...

@@ -7,6 +7,7 @@ use crate::work;
 use handeye::calibrate::{self as library, DeterminedBy, NoiseTrial, Options, Report, length_in_words};
 use handeye::report::{Subject, html, suggestion};
 use handeye::rig;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
@@ -17,6 +18,8 @@ use std::sync::Arc;
 /// rig: what is known; left out, everything is learned from the recording alone. relearn: paths of parameters to learn anew from few
 /// samples while everything else is held, such as ``["cameras.left"]``. estimate_noise: the noise of pixels, points, joints, poses and
 /// actions is estimated from the data. select_noise: the noise of joints or poses is picked by how well samples held out are predicted.
+/// tag_side: the side of all tags whose corners are features [m]. lengths: distances that were measured between two features or two
+/// cameras, such as ``[("features.f0", "features.f7", 0.12)]`` [m]; both are taken to be 0.5 mm off.
 /// influence: what leaving out each sample would change is computed too. seed: the same seed gives the same rig, byte for byte.
 /// progress: called with a ``Progress`` as the work goes on; what it raises ends the work, and so does Ctrl-C. threads: to work on, all
 /// cores where left out; the result does not depend on it.
@@ -27,7 +30,7 @@ use std::sync::Arc;
 /// fit together.
 #[pyfunction]
 #[pyo3(signature = (recording, rig = None, *, relearn = None, estimate_noise = false, select_noise = false, influence = false, seed = 1,
-    progress = None, threads = None))]
+    tag_side = None, lengths = None, progress = None, threads = None))]
 #[expect(clippy::too_many_arguments, reason = "one keyword per option")]
 pub fn calibrate(
     py: Python<'_>,
@@ -38,10 +41,18 @@ pub fn calibrate(
     select_noise: bool,
     influence: bool,
     seed: u64,
+    tag_side: Option<f64>,
+    lengths: Option<Vec<(String, String, f64)>>,
     progress: Option<Py<PyAny>>,
     threads: Option<usize>,
 ) -> PyResult<Calibration> {
-    let (before, text) = rig.map_or_else(Default::default, |rig| (rig.inner.clone(), rig.text.clone()));
+    let (mut before, text) = rig.map_or_else(Default::default, |rig| (rig.inner.clone(), rig.text.clone()));
+    before.estimate.tag_side = tag_side.or(before.estimate.tag_side);
+    for (one, other, length) in lengths.unwrap_or_default() {
+        let between =
+            rig::Ends::new([&one, &other]).map_err(|problem| PyValueError::new_err(format!("lengths: {problem}")))?;
+        before.estimate.lengths.push(rig::Length { between, length, sd: rig::Length::RULER });
+    }
     let options = Options { seed, estimate_noise, influence };
     let recording = recording.inner.clone();
     let inner = work::run(py, progress.as_ref(), threads, |observer| {

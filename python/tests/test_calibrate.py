@@ -133,6 +133,23 @@ def test_what_moved_is_relearned_from_a_few_samples(ur5):
     assert (np.abs(shift) < 5 * sd).all() and (sd < 0.01).all()
 
 
+def test_a_measured_length_tells_how_large_everything_is(motions, ur5):
+    def distance(rig, one, other):
+        return np.linalg.norm(np.subtract(rig[f"features.{one}.xyz"], rig[f"features.{other}.xyz"]))
+
+    learned = handeye.calibrate(motions, lengths=[("features.f0", "features.f7", distance(ur5, "f0", "f7"))])
+    assert learned.tip.metric
+    assert abs(distance(learned.rig, "f2", "f9") / distance(ur5, "f2", "f9") - 1.0) < 0.01
+    assert not handeye.calibrate(motions).tip.metric
+    with pytest.raises(ValueError, match="two features or two cameras"):
+        handeye.calibrate(motions, lengths=[("f0", "f7", 0.1)])
+    for wrong in (0.0, -0.1, float("nan")):
+        with pytest.raises(handeye.UnusableInput, match="above 0"):
+            handeye.calibrate(motions, lengths=[("features.f0", "features.f7", wrong)])
+    with pytest.raises(handeye.UnusableInput, match="no tag has its four corners"):
+        handeye.calibrate(motions, tag_side=0.06)
+
+
 def test_wrong_samples_are_named(ur5, motions):
     pixels = motions.pixels
     for camera in pixels:

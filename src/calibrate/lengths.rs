@@ -46,8 +46,13 @@ impl Found {
 
 /// Everything that was measured, with its ends.
 ///
-/// Errors: those of [`Found::new`], and [`Error::Unusable`] where the side of tags is given and there are none.
+/// Errors: those of [`Found::new`], and [`Error::Unusable`] where a number is not above 0, or the side of tags is given and there are none.
 pub(crate) fn find(rig: &Rig) -> Result<Vec<(Length, Found)>, Error> {
+    let numbers =
+        rig.estimate.lengths.iter().flat_map(|length| [length.length, length.sd]).chain(rig.estimate.tag_side);
+    if let Some(wrong) = numbers.into_iter().find(|number| !(*number > 0.0 && number.is_finite())) {
+        return Err(Error::Unusable(format!("`lengths` and `tag_side` of [estimate] are above 0, found {wrong} m")));
+    }
     let given = rig.estimate.lengths.iter().map(|length| Ok((length.clone(), Found::new(rig, length)?)));
     let mut found: Vec<(Length, Found)> = given.collect::<Result<_, Error>>()?;
     if let Some(side) = rig.estimate.tag_side {

@@ -1,6 +1,7 @@
 //! Where the robot was when images were taken, between the rows that say it.
 use super::images::keep_actions;
 use super::track::{At, Track};
+use super::whereabouts::Whereabouts;
 use super::{Recording, Sample};
 use handeye_solvers::Pose;
 use std::collections::BTreeMap;
@@ -16,23 +17,9 @@ pub(super) struct Moment<'a> {
 ///
 /// Errors: in words, where rows say nothing, or nothing of the time of any image.
 pub(super) fn at_times(images: &[Moment], states: &Recording, notes: &mut Vec<String>) -> Result<Vec<Sample>, String> {
-    let moments: Vec<i64> = images.iter().map(|image| image.time).collect();
-    let mut joints: Track<Vec<f64>> = Track::new(moments.len());
-    let mut poses: Track<Pose> = Track::new(moments.len());
-    let mut row_at: BTreeMap<i64, usize> = BTreeMap::new();
-    for (row, sample) in states.samples.iter().enumerate() {
-        let Some(time) = sample.time else { continue };
-        let time = (time * 1e9) as i64;
-        row_at.insert(time, row);
-        if let Some(read) = &sample.joints {
-            joints.add(&moments, time, read);
-        }
-        if let Some(pose) = &sample.pose {
-            poses.add(&moments, time, pose);
-        }
-    }
-    let spans = [joints.span(), poses.span()];
-    let (joints, poses) = (joints.at(&moments), poses.at(&moments));
+    let (Whereabouts { moments, joints, poses }, spans) = whereabouts(images.iter().map(|image| image.time), states);
+    let times = states.samples.iter().enumerate().filter_map(|(row, sample)| Some((nanoseconds(sample.time?), row)));
+    let row_at: BTreeMap<i64, usize> = times.collect();
     let gaps: Vec<Gaps> = joints.iter().zip(&poses).map(|(joints, pose)| [gap(joints), gap(pose)]).collect();
     note_on_outside(images, &gaps, spans, notes)?;
     notes.extend(note_on_gaps(images, &gaps));
@@ -54,6 +41,29 @@ pub(super) fn at_times(images: &[Moment], states: &Recording, notes: &mut Vec<St
     let leads = |index: usize| row_of(index).is_some_and(|row| row_of(index + 1) == Some(row + 1));
     keep_actions(&mut samples, leads, states, notes);
     Ok(samples)
+}
+
+/// Where rows have the robot at some moments [ns, sorted], and from when to when they say anything of its joints and of its tip.
+pub(super) fn whereabouts(moments: impl Iterator<Item = i64>, states: &Recording) -> (Whereabouts, [Span; 2]) {
+    let moments: Vec<i64> = moments.collect();
+    let mut joints: Track<Vec<f64>> = Track::new(moments.len());
+    let mut poses: Track<Pose> = Track::new(moments.len());
+    for sample in &states.samples {
+        let Some(time) = sample.time.map(nanoseconds) else { continue };
+        if let Some(read) = &sample.joints {
+            joints.add(&moments, time, read);
+        }
+        if let Some(pose) = &sample.pose {
+            poses.add(&moments, time, pose);
+        }
+    }
+    let spans = [joints.span(), poses.span()];
+    let (joints, poses) = (joints.at(&moments), poses.at(&moments));
+    (Whereabouts { moments, joints, poses }, spans)
+}
+
+fn nanoseconds(seconds: f64) -> i64 {
+    (seconds * 1e9) as i64
 }
 
 /// How far apart the joints are, and the tip poses, that a sample lies between [ns]; `None` where it does not.

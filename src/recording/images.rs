@@ -1,7 +1,8 @@
 //! What images show, with where the robot was at the time.
-use super::at_times::{Moment, at_times};
-use super::groups::{Group, Image, groups, samples};
+use super::at_times::{Moment, at_times, whereabouts};
+use super::groups::{Group, Image, groups, moments, samples, split};
 use super::names::Names;
+use super::whereabouts::note_on_apart;
 use super::{RecordedCamera, Recording, Sample};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -44,7 +45,7 @@ impl Recording {
     /// Joins images with the joints, poses and actions of rows.
     ///
     /// Images that show nothing are left out, with their rows. By [`Pairing::Time`] images of several cameras make one sample where their times
-    /// are within half the time between two images of one camera; otherwise where they have one name. Without rows, samples are in the order
+    /// are within half the time between two images of one camera and the robot did not move between them; otherwise where they have one name. Without rows, samples are in the order
     /// of `images`, whose names come in their order.
     ///
     /// Returned are the recording, without samples where no image shows anything, and notes. Errors: what does not fit, in words.
@@ -68,6 +69,14 @@ impl Recording {
         let camera_of_source: Vec<u32> = (0..cameras.len() as u32).collect();
         let groups = groups(&stamped, &camera_of_source, (!by_time).then_some(0));
         let mut notes = Vec::new();
+        let (groups, apart) = match rows.filter(|rows| rows.pairing == Pairing::Time) {
+            Some(Rows { states, .. }) => {
+                let (whereabouts, _) = whereabouts(moments(&groups, &stamped).into_iter(), states);
+                split(groups, &stamped, |first, last| whereabouts.moved(first, last))
+            }
+            None => (groups, 0),
+        };
+        notes.extend(note_on_apart(apart));
         let blank = images.iter().filter(|image| image.features.is_empty()).count();
         if blank > 0 {
             notes.push(format!("{blank} of {} images show nothing of what is looked for", images.len()));

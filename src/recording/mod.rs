@@ -17,6 +17,7 @@ mod select;
 mod table;
 mod track;
 mod types;
+mod whereabouts;
 
 pub use bag::{BagOptions, Detect, Found};
 pub(crate) use clock::{LATEST, are_far_apart, unit_of_date};

@@ -2,7 +2,7 @@
 use crate::cli::Folder;
 use crate::detect::{CENTRE, CHARUCO, FOCAL, SIZE, TAG36H11, View, is_dark, is_dark_charuco, png};
 use handeye::detect::Gray;
-use handeye::recording::{OpenOptions, Recording};
+use handeye::recording::{ImageSeen, OpenOptions, Pairing, RecordedCamera, Recording, Rows, Sample};
 use mcap::WriteOptions;
 use mcap::records::MessageHeader;
 use nalgebra::{Rotation3, Vector3};
@@ -293,4 +293,40 @@ fn what_was_commanded_stays_where_it_leads_to_the_next_image_and_what_is_lost_is
     );
     let (_, error) = folder.expect(2, "detect left bag.mcap --pattern tag36h11 -o out.jsonl");
     assert!(error.starts_with("error: bag.mcap: a bag is looked at alone"), "{error}");
+}
+
+/// Two cameras 20 ms apart: the robot stands still at first, then its joint goes with the time, by 1 rad/s.
+#[test]
+fn images_by_time_between_which_the_robot_moved_are_samples_of_their_own() {
+    let angle = |seconds: f64| (seconds - 1.05).max(0.0);
+    let states = Recording {
+        joints: vec!["a".to_owned()],
+        samples: (0..40)
+            .map(|index| 0.9 + 0.01 * f64::from(index))
+            .map(|time| Sample { time: Some(time), joints: Some(vec![angle(time)]), ..Sample::default() })
+            .collect(),
+        ..Recording::default()
+    };
+    let image = |camera: u32, time: f64| ImageSeen {
+        camera,
+        name: format!("{time:.2}"),
+        time: Some(time),
+        features: vec![("f".to_owned(), [10.0, 20.0])],
+    };
+    let images: Vec<ImageSeen> =
+        [1.0, 1.1, 1.2].into_iter().flat_map(|time| [image(0, time), image(1, time + 0.02)]).collect();
+    let cameras = ["left", "right"].map(|name| RecordedCamera { name: name.to_owned(), ..RecordedCamera::default() });
+    let rows = Rows { states: &states, names: &[], pairing: Pairing::Time };
+    let (recording, notes) = Recording::from_images(cameras.to_vec(), &images, Some(rows)).unwrap();
+    let found: Vec<(f64, f64, usize)> = recording
+        .samples
+        .iter()
+        .map(|sample| (sample.time.unwrap(), sample.joints.as_ref().unwrap()[0], sample.pixels.len()))
+        .collect();
+    let expected = [(1.01, 2), (1.1, 1), (1.12, 1), (1.2, 1), (1.22, 1)];
+    assert_eq!(found.len(), expected.len(), "{found:?}");
+    for ((time, read, seen), (at, number)) in found.into_iter().zip(expected) {
+        assert!((time - at).abs() < 1e-6 && (read - angle(at)).abs() < 1e-6 && seen == number, "{time} {read} {seen}");
+    }
+    assert!(notes.iter().any(|note| note.starts_with("2 times the robot moved")), "{notes:?}");
 }

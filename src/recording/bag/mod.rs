@@ -19,6 +19,7 @@ use super::groups::{Group, groups, moments, samples, split};
 use super::order::note_on_others;
 use super::same_joints::are_those;
 use super::track::At;
+use super::whereabouts::{Whereabouts, note_on_apart};
 use super::{OpenOptions, Opened, Recording};
 use crate::Error;
 pub(super) use folder::is_bag;
@@ -137,25 +138,12 @@ pub(super) fn read<'a>(
         None => states.poses.at(&moments),
     };
     let joints = states.joints.at(&moments);
-    let place = |time: i64| moments.binary_search(&time).ok();
-    let moved = |first: i64, last: i64| {
-        let (Some(first), Some(last)) = (place(first), place(last)) else { return false };
-        let joints = joints[first].as_ref().zip(joints[last].as_ref());
-        let poses = poses[first].as_ref().zip(poses[last].as_ref());
-        joints.is_some_and(|(one, other)| one.value.iter().zip(&other.value).any(|(a, b)| (a - b).abs() > STILL))
-            || poses.is_some_and(|(one, other)| {
-                let shift = other.value.translation - one.value.translation;
-                one.value.angle_to(&other.value) > STILL || shift.norm() > STILL
-            })
-    };
+    let whereabouts = Whereabouts { moments: moments.clone(), joints, poses };
     let (groups, apart) = match of_bag.join {
         Some(_) => (groups, 0),
-        None => split(groups, &images.images, moved),
+        None => split(groups, &images.images, |first, last| whereabouts.moved(first, last)),
     };
-    let places: Vec<usize> = groups.iter().filter_map(|group| place(group.time)).collect();
-    let (mut joints, mut poses) = (joints, poses);
-    let joints: Vec<_> = places.iter().map(|&place| joints[place].take()).collect();
-    let poses: Vec<_> = places.iter().map(|&place| poses[place].take()).collect();
+    let Whereabouts { joints, poses, .. } = whereabouts.of(&groups);
     notes.append(&mut of_cameras);
     notes.extend(note_on_groups(&groups, apart));
     if joint_topic.is_some() {
@@ -192,20 +180,11 @@ pub(super) fn read<'a>(
     Ok(Opened { recording: recording.checked_as(&file)?, notes, images: Vec::new() })
 }
 
-/// A robot that moves by less between two images stands still [rad, m]: a tenth of a pixel or so.
-const STILL: f64 = 2e-4;
-
 fn note_on_groups(groups: &[Group], apart: usize) -> Vec<String> {
     let spread = groups.iter().map(|group| group.spread).max().filter(|spread| *spread > 0);
     let spread =
         spread.map(|spread| format!("images that make one sample are up to {:.6} s apart", spread as f64 / 1e9));
-    let apart = (apart > 0).then(|| {
-        format!(
-            "{apart} times the robot moved by more than {} mrad or mm from one camera's image to the next, so that each is a sample of its own \
-             (--join S would have one of all within S seconds)",
-            1e3 * STILL
-        )
-    });
+    let apart = note_on_apart(apart).map(|note| format!("{note} (--join S makes one of all within S seconds)"));
     spread.into_iter().chain(apart).collect()
 }
 
