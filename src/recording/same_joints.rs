@@ -72,7 +72,7 @@ fn around<'a>(long: &'a str, name: &str) -> Vec<(&'a str, &'a str)> {
     long.match_indices(name)
         .map(|(at, _)| (&long[..at], &long[at + name.len()..]))
         .filter(|(before, after)| is_apart(before.chars().next_back()) && is_apart(after.chars().next()))
-        .filter(|(before, after)| !name.is_empty() && !(before.is_empty() && after.is_empty()))
+        .filter(|(before, after)| !name.is_empty() && (!before.is_empty() || !after.is_empty()))
         .collect()
 }
 
