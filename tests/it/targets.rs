@@ -107,6 +107,29 @@ fn exact_poses_give_the_exact_camera_and_target_on_the_hand_or_in_the_world() {
     }
 }
 
+/// However few the poses are, their noise alone makes no scale; where there is one, a dozen show it.
+#[test]
+fn a_scale_is_found_where_there_is_one_and_not_in_the_noise_of_a_few_poses() {
+    let target = PoseNoise { xyz: 0.002, rot: 0.002 };
+    let with_scale = |poses: usize, scale: Option<f64>| {
+        let is_found = |seed: &u64| {
+            let mut random = ChaCha8Rng::seed_from_u64(*seed);
+            let world = world(&mut random, seed % 2 == 0);
+            let tips: Vec<Pose> = (0..poses).map(|_| pose(&mut random, 1.0, 0.3)).collect();
+            let spoilt = Spoilt { target, scale, ..Spoilt::default() };
+            let samples = tips.into_iter().map(|tip| world.sample(&mut random, tip, spoilt)).collect();
+            learn(&world.rig(), &recording(samples)).report.targets.unwrap().scale.is_some()
+        };
+        (0..100).filter(is_found).count()
+    };
+    for poses in [3, 4, 5, 8, 20] {
+        let alarms = with_scale(poses, None);
+        assert!(alarms <= 1, "{poses} poses: {alarms} of 100");
+    }
+    let found = with_scale(12, Some(1.3));
+    assert!(found >= 99, "{found} of 100");
+}
+
 // Normalised squared errors of the camera's six numbers are χ² with 6 degrees of freedom: over 40 seeds the sum has mean 240 and
 // standard deviation 22.
 #[test]

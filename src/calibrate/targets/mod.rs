@@ -6,6 +6,7 @@ mod account;
 mod clock;
 mod graph;
 mod moments;
+mod scale;
 mod scatter;
 mod setup;
 mod spread;
@@ -39,10 +40,6 @@ const XYZ: f64 = 0.003;
 
 /// Starts that are refined.
 const REFINED: usize = 3;
-
-/// A scale counts as unknown where it is this far from 1 and lowers the cost by so much (5 standard deviations).
-const OFF_SCALE: f64 = 0.03;
-const LOWERS: f64 = 12.5;
 
 /// Learns the poses of cameras and targets; see [`super::calibrate`].
 pub(super) fn calibrate_targets(
@@ -136,17 +133,6 @@ impl Fitted {
         }
         let (built, report, solver) = last.ok_or_else(|| Error::NotEnoughData("no round of the fit was run".into()))?;
         Ok(Fitted { setup, state, freedom, built, solver, report, iterations, first_cost })
-    }
-
-    /// True where a free scale explains far more than the scale 1, under the noise that it leaves.
-    fn is_better_than(&self, fixed: &Fitted) -> Result<bool, Error> {
-        if (self.state.scale - 1.0).abs() < OFF_SCALE {
-            return Ok(false);
-        }
-        let mut state = State { sigmas: self.state.sigmas, walks: self.state.walks, ..fixed.state.clone() };
-        let mut built = build(&fixed.setup, &state, fixed.freedom, Loss::Cauchy(TAILS));
-        let (report, _) = built.minimize(&mut state)?;
-        Ok(report.final_cost - self.report.final_cost > LOWERS)
     }
 }
 
