@@ -1,9 +1,10 @@
 """A ROS 2 bag to a learned rig and a page to read, without an installation of ROS.
 
     pip install ./python mcap-ros2-support
-    python python/examples/calibrate_bag.py [BAG]
+    python python/examples/calibrate_bag.py [BAG [RIG]]
 
-Without a bag of your own, one is written first: a simulated UR5 before two cameras, joint states, camera info and detections on the topics
+RIG is a rig file or the name of a shipped rig (ur5e, panda, ...), whose names tell which joints are the arm's, and in which order. Without a bag
+of your own, one is written first: a simulated UR5 before two cameras, joint states, camera info and detections on the topics
 that a driver and a tag detector would use. Cells (# %%) open as a notebook in VS Code and Jupytext.
 """
 
@@ -78,13 +79,14 @@ def write_bag(path, rig, recording):
 
 # %% The bag
 folder = Path(tempfile.mkdtemp(prefix="handeye-"))
-if len(sys.argv) == 2:
+known = sys.argv[2] if len(sys.argv) > 2 else None
+if len(sys.argv) > 1:
     bag = Path(sys.argv[1])
 else:
     bag, ur5 = folder / "motions.mcap", handeye.Rig.load("ur5")
     write_bag(bag, ur5, handeye.simulate(ur5, samples=60, seed=1, missed=0.1).recording)
     print(f"wrote {bag} ({bag.stat().st_size} bytes)")
-motions = handeye.Recording.load(bag)
+motions = handeye.Recording.load(bag, rig=known)
 print(f"read {motions}")
 
 # %% Learning: every fifth sample is held out, to judge by
@@ -99,7 +101,7 @@ def progress(now):
 
 held_out = list(range(0, len(motions), 5))
 used = [i for i in range(len(motions)) if i not in held_out]
-learned = handeye.calibrate(motions.select(used), progress=progress)
+learned = handeye.calibrate(motions.select(used), known, progress=progress)
 print(learned)
 
 # %% How good it is

@@ -47,7 +47,7 @@ pub fn calibrate(
     threads: Option<usize>,
 ) -> PyResult<Calibration> {
     let (mut before, text) = rig.map_or_else(Default::default, |rig| (rig.inner.clone(), rig.text.clone()));
-    before.estimate.tag_side = tag_side.or(before.estimate.tag_side);
+    before.estimate.tag_side = tag_side.map(|side| [side, rig::Length::RULER]).or(before.estimate.tag_side);
     for (one, other, length) in lengths.unwrap_or_default() {
         let between =
             rig::Ends::new([&one, &other]).map_err(|problem| PyValueError::new_err(format!("lengths: {problem}")))?;

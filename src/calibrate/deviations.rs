@@ -23,6 +23,8 @@ pub(crate) struct Deviations {
     pub by_path: BTreeMap<String, Vec<f64>>,
     /// Over the recorded samples; `None` where the data leave something open.
     pub tip: Option<TipDeviation>,
+    /// Of every camera's pose against the arm, length [m] and angle [rad]; empty where the tip's is not known.
+    pub cameras: Vec<[f64; 2]>,
     /// What nothing, or a prior more than the data, determines.
     pub weak: Vec<Combination>,
 }
@@ -109,17 +111,24 @@ pub(crate) fn deviations(honest: &Honest<'_>, freedom: &Freedom, state: &State, 
         if deviations.weak.is_empty() {
             deviations.weak.extend(poorly::determined(honest, state, freedom, &built, &mut covariance));
         }
-        deviations.tip = tip(honest, freedom, state, verdict);
+        if let Some((tip, cameras)) = against_arm(honest, freedom, state, verdict) {
+            (deviations.tip, deviations.cameras) = (Some(tip), cameras);
+        }
     }
     deviations
 }
 
-/// Deviation of the tip's position, root of the trace of its covariance, over the samples.
+/// Deviation of the tip's position, root of the trace of its covariance, over the samples; and of every camera's pose.
 ///
 /// The base and the tip's frame are taken as they are: where only a prior says how the base lies against the first axis, or
 /// the tip's frame against the features, nothing that is seen depends on it. Joints are taken as they are too: how well those
 /// of a sample were read is no matter of the rig. `None` also where the tip does not follow from anything that is learned.
-fn tip(honest: &Honest<'_>, freedom: &Freedom, state: &State, verdict: &Verdict) -> Option<TipDeviation> {
+fn against_arm(
+    honest: &Honest<'_>,
+    freedom: &Freedom,
+    state: &State,
+    verdict: &Verdict,
+) -> Option<(TipDeviation, Vec<[f64; 2]>)> {
     let freedom = gauge::with_frames_held(&honest.setup, freedom);
     if !gauge::is_tip_learned(&honest.setup, &freedom) {
         return None;
@@ -141,13 +150,20 @@ fn tip(honest: &Honest<'_>, freedom: &Freedom, state: &State, verdict: &Verdict)
         sds.push(variance.sqrt());
         by_data.push((variance - of_priors).max(0.0).sqrt());
     }
+    let mut pose = |key: Key<Pose>| {
+        let block = covariance.of(key);
+        let size = |first: usize| (first..first + 3).map(|i| block[(i, i)].max(0.0)).sum::<f64>().sqrt();
+        [size(3), size(0)]
+    };
+    let cameras = built.cameras.iter().map(|(key, _)| pose(*key)).collect();
     let largest = sds.iter().copied().reduce(f64::max)?;
-    Some(TipDeviation {
+    let tip = TipDeviation {
         median: median(&mut sds),
         largest,
         by_data: median(&mut by_data),
         metric: gauge::length_is_known(&honest.setup),
-    })
+    };
+    Some((tip, cameras))
 }
 
 /// Derived tips of samples, spread evenly over the recording, and which samples these are.

@@ -6,13 +6,17 @@ use super::graph::{State, row};
 use super::lengths;
 use super::observation::Kind;
 use super::outliers::Verdict;
+use super::priors::prior_sds;
 use super::residuals::distances;
 use super::setup::Setup;
 use super::weak;
 use super::{Calibration, CameraErrors, Finding, Report, StageReport};
 use crate::camera::CameraModel;
-use crate::rig::{Fit, Rig};
+use crate::rig::{Fit, JointField, Parameter, Rig};
 use handeye_solvers::Pose;
+
+/// Values are told of where they are so many standard deviations from what was given.
+const FAR: f64 = 5.0;
 
 /// Errors are told of where they are this many times the stated noise.
 const MISFIT: f64 = 3.0;
@@ -77,6 +81,7 @@ pub(crate) fn finish(
         joints: ranges(setup, state, &used_samples),
         sd: deviations.by_path,
     });
+    let far = far_from_given(&setup.rig, &rig);
     let unseen = setup.unseen.iter().map(|camera| Finding::UnseenCamera { camera: camera.clone() });
     let misfits = Kind::ALL.into_iter().filter_map(|kind| {
         let rms = if kind == Kind::Pixels { total.rms_px } else { total.points.rms_m };
@@ -98,13 +103,37 @@ pub(crate) fn finish(
         gauge,
         noise: None,
         states: setup.states.words(&setup.rig.noise),
-        findings: misfits.chain(lengths::missed(setup, state)).chain(unseen).chain(verdict.findings).collect(),
+        findings: misfits
+            .chain(lengths::missed(setup, state))
+            .chain(far)
+            .chain(unseen)
+            .chain(verdict.findings)
+            .collect(),
         tip: deviations.tip,
+        camera_poses: deviations.cameras,
         weak: deviations.weak,
         influence: Vec::new(),
         targets: None,
     };
     Calibration { rig, report }
+}
+
+/// Joints' numbers that were given, are not held, and are somewhere else.
+fn far_from_given(given: &Rig, learned: &Rig) -> Option<Finding> {
+    let mut values: Vec<(String, [f64; 2], f64)> = Vec::new();
+    for parameter in given.parameters().into_iter().filter(|parameter| !given.is_fixed(parameter)) {
+        let Parameter::JointField { joint, field } = parameter else { continue };
+        let both = [given, learned].map(|rig| field.value(&rig.robot.joints[joint]));
+        let ([Some(was), Some(is)], Some(sds)) = (both, prior_sds(given, &parameter)) else { continue };
+        let is_length = matches!(field, JointField::D | JointField::A);
+        let off = if is_length { is - was } else { wrapped(is - was) };
+        let sds = off.abs() / sds[0];
+        if sds > FAR {
+            values.push((parameter.path(given), [was, is], sds));
+        }
+    }
+    values.sort_by(|one, other| other.2.total_cmp(&one.2));
+    (!values.is_empty()).then_some(Finding::FarFromGiven { values })
 }
 
 /// Smallest and largest value of every joint in samples with joints that were used.

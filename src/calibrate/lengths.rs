@@ -48,18 +48,17 @@ impl Found {
 ///
 /// Errors: those of [`Found::new`], and [`Error::Unusable`] where a number is not above 0, or the side of tags is given and there are none.
 pub(crate) fn find(rig: &Rig) -> Result<Vec<(Length, Found)>, Error> {
-    let numbers =
-        rig.estimate.lengths.iter().flat_map(|length| [length.length, length.sd]).chain(rig.estimate.tag_side);
-    if let Some(wrong) = numbers.into_iter().find(|number| !(*number > 0.0 && number.is_finite())) {
+    let of_tags = rig.estimate.tag_side.into_iter().flatten();
+    let mut numbers = rig.estimate.lengths.iter().flat_map(|length| [length.length, length.sd]).chain(of_tags);
+    if let Some(wrong) = numbers.find(|number| !(*number > 0.0 && number.is_finite())) {
         return Err(Error::Unusable(format!("`lengths` and `tag_side` of [estimate] are above 0, found {wrong} m")));
     }
     let given = rig.estimate.lengths.iter().map(|length| Ok((length.clone(), Found::new(rig, length)?)));
     let mut found: Vec<(Length, Found)> = given.collect::<Result<_, Error>>()?;
     if let Some(side) = rig.estimate.tag_side {
-        let before = found.len();
-        let tags = (0..rig.features.len()).filter_map(|first| corners(rig, first));
-        found.extend(tags.flat_map(|tag| sides_and_diagonals(rig, tag, side)));
-        if found.len() == before {
+        let tags = tags(rig);
+        found.extend(tags.iter().flat_map(|tag| sides_and_diagonals(rig, *tag, side, tags.len())));
+        if tags.is_empty() {
             return Err(Error::Unusable(
                 "`tag_side` of [estimate]: no tag has its four corners, FAMILY:ID/0 to FAMILY:ID/3, among the features"
                     .to_owned(),
@@ -67,6 +66,11 @@ pub(crate) fn find(rig: &Rig) -> Result<Vec<(Length, Found)>, Error> {
         }
     }
     Ok(found)
+}
+
+/// The corners of every tag.
+pub(crate) fn tags(rig: &Rig) -> Vec<[usize; 4]> {
+    (0..rig.features.len()).filter_map(|first| corners(rig, first)).collect()
 }
 
 /// The corners of the tag whose first one this feature is.
@@ -82,13 +86,20 @@ fn corners(rig: &Rig, first: usize) -> Option<[usize; 4]> {
     Some([first, place(1)?, place(2)?, place(3)?])
 }
 
-fn sides_and_diagonals(rig: &Rig, tag: [usize; 4], side: f64) -> impl Iterator<Item = (Length, Found)> {
+/// Each is known so well, for its length, that those of all `tags` together are known as the side is: one printer made them.
+fn sides_and_diagonals(
+    rig: &Rig,
+    tag: [usize; 4],
+    [side, sd]: [f64; 2],
+    tags: usize,
+) -> impl Iterator<Item = (Length, Found)> {
+    let share = sd / side * (6.0 * tags as f64).sqrt();
     let pairs = (0..4).flat_map(move |one| (one + 1..4).map(move |other| [one, other]));
     pairs.map(move |[one, other]| {
         let ends = [tag[one], tag[other]];
         let between = Ends::Features(ends.map(|feature| rig.features[feature].name.clone()));
         let length = if other - one == 2 { SQRT_2 * side } else { side };
-        (Length { between, length, sd: Length::RULER }, Found::Features(ends))
+        (Length { between, length, sd: share * length }, Found::Features(ends))
     })
 }
 

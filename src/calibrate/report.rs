@@ -46,6 +46,9 @@ pub struct Report {
     pub findings: Vec<Finding>,
     /// Standard deviation of the tip over the recorded workspace; `None` where the data leave the rig open.
     pub tip: Option<TipDeviation>,
+    /// Standard deviations of the pose of every camera of the learned rig against the arm: length [m, or the model's unit] and angle [rad]. Where
+    /// the base's frame lies against the first axis, which nothing that is seen depends on, is no part of them. Empty where the tip has none.
+    pub camera_poses: Vec<[f64; 2]>,
     /// Combinations of numbers that nothing, or a prior more than the data, determines; the weakest first.
     pub weak: Vec<Combination>,
     /// What leaving out each sample would change, where [`Options::influence`](super::Options) asks for it.
@@ -90,6 +93,11 @@ pub enum Finding {
         length: Length,
         /// How long it is in the learned rig [m].
         learned: f64,
+    },
+    /// Joints' numbers that are further from what the rig gives than is assumed of it, by more than 5 standard deviations, the furthest first.
+    FarFromGiven {
+        /// Path, given and learned value [m, rad], and standard deviations between them.
+        values: Vec<(String, [f64; 2], f64)>,
     },
     /// Single detections were left out.
     Outliers {
@@ -151,6 +159,18 @@ impl Finding {
                 1e3 * length.length,
                 1e3 * learned
             ),
+            Finding::FarFromGiven { values } => {
+                let one = |(path, [given, learned], sds): &(String, [f64; 2], f64)| {
+                    format!("{path} is {learned:.4}, {sds:.0} standard deviations from the {given:.4} that was given")
+                };
+                let named: Vec<String> = values.iter().take(3).map(one).collect();
+                let more = values.len().saturating_sub(named.len());
+                let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+                format!(
+                    "{}{more}: this is another robot than the rig's, or a length that was given is wrong",
+                    named.join(", ")
+                )
+            }
             Finding::Outliers { count, of } => format!("{count} of {of} detections do not fit"),
             Finding::WrongJoints { sample, off, swapped_with, by_pose } => {
                 let (leads, fits) = if *by_pose { ("tip pose does", "it fits") } else { ("joints do", "they fit") };
@@ -177,7 +197,7 @@ impl std::fmt::Display for Finding {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let words = self.of_evaluation();
         match self {
-            Finding::Misfit { .. } | Finding::MissedLength { .. } => f.write_str(&words),
+            Finding::Misfit { .. } | Finding::MissedLength { .. } | Finding::FarFromGiven { .. } => f.write_str(&words),
             Finding::UnseenCamera { .. } | Finding::Outliers { .. } => {
                 let verb = if matches!(self, Finding::UnseenCamera { .. }) { "was" } else { "were" };
                 write!(f, "{words} and {verb} left out")
@@ -284,20 +304,32 @@ pub fn length_in_words(length: f64, metric: bool) -> String {
     if metric { format!("{:.3} mm", 1e3 * length) } else { format!("{length:.2e}") }
 }
 
+/// Of two standard deviations, the smaller is told too where it is below this share of the other.
+const ALIKE: f64 = 0.9;
+
 /// How well the pose of every camera is known, with what priors say of it, in words; nothing of those whose poses are held or left open.
 pub fn camera_deviations(calibration: &Calibration) -> Vec<String> {
     let Calibration { rig: learned, report } = calibration;
     let unit = if report.metric { "" } else { ", in the model's unit" };
-    let of_camera = |camera: &Camera| {
+    let of_camera = |(index, camera): (usize, &Camera)| {
         let sd = learned.fit.as_ref()?.sd.get(&format!("cameras.{}.pose", camera.name))?;
         let [x, y, z, turns @ ..] = sd.as_slice() else { return None };
         let turn = turns.iter().map(|sd| sd * sd).sum::<f64>().sqrt();
-        let length = length_in_words((x * x + y * y + z * z).sqrt(), report.metric);
-        Some(format!(
-            "the pose of camera `{}` is known to {length} and {:.3}° (standard deviation, with the priors{unit})",
-            camera.name,
-            turn.to_degrees()
-        ))
+        let shift = (x * x + y * y + z * z).sqrt();
+        let words =
+            |shift: f64, turn: f64| format!("{} and {:.3}°", length_in_words(shift, report.metric), turn.to_degrees());
+        let (name, whole) = (&camera.name, words(shift, turn));
+        let against_arm = report.camera_poses.get(index).filter(|[less, _]| *less > 0.0 && *less < ALIKE * shift);
+        Some(match against_arm {
+            Some([shift, turn]) => format!(
+                "the pose of camera `{name}` against the arm is known to {} (standard deviation, with the priors{unit}); to {whole} where the base's \
+                 frame, of which nothing is seen, counts as no better known than assumed",
+                words(*shift, *turn)
+            ),
+            None => {
+                format!("the pose of camera `{name}` is known to {whole} (standard deviation, with the priors{unit})")
+            }
+        })
     };
-    learned.cameras.iter().filter_map(of_camera).collect()
+    learned.cameras.iter().enumerate().filter_map(of_camera).collect()
 }

@@ -62,12 +62,13 @@ pub struct Calibrate {
     /// Pick the noise of joints or poses, relative to that of pixels, by how well samples held out are predicted
     #[arg(long, conflicts_with = "estimate_noise")]
     select_noise: bool,
-    /// A distance that was measured between two features or two cameras [m], to 0.5 mm; may be given more than once
-    #[arg(long, value_name = "A,B=METRES", value_parser = read_length)]
+    /// A distance that was measured between two features, or cameras.A and cameras.B, and its standard deviation [m] [default: 0.0005]; may be
+    /// given more than once
+    #[arg(long, value_name = "A,B=METRES[,SD]", value_parser = read_length)]
     length: Vec<Length>,
-    /// The side of all tags whose corners are features [m], to 0.5 mm
-    #[arg(long, value_name = "METRES", value_parser = metres)]
-    tag_side: Option<f64>,
+    /// The side of all tags whose corners are features, and its standard deviation [m] [default: 0.0005]
+    #[arg(long, value_name = "METRES[,SD]", value_parser = read_tag_side)]
+    tag_side: Option<[f64; 2]>,
     /// Seed of every random choice: the same seed gives the same rig
     #[arg(long, value_name = "S", default_value_t = Options::default().seed)]
     seed: u64,
@@ -81,16 +82,33 @@ pub struct Calibrate {
     reading: Reading,
 }
 
-/// `features.A,features.B=0.12`
+/// `f0,f7=0.12`, `cameras.left,cameras.right=0.3,0.001`
 fn read_length(text: &str) -> Result<Length, String> {
-    let (between, length) = text.split_once('=').ok_or("expected A,B=METRES, as features.f0,features.f7=0.12")?;
-    let (one, other) = between.split_once(',').ok_or("expected two ends, as features.f0,features.f7=0.12")?;
-    Ok(Length { between: Ends::new([one, other])?, length: metres(length)?, sd: Length::RULER })
+    let expected = || "expected A,B=METRES[,SD], as f0,f7=0.12 or cameras.left,cameras.right=0.3".to_owned();
+    let (between, length) = text.split_once('=').ok_or_else(expected)?;
+    let (one, other) = between.split_once(',').ok_or_else(expected)?;
+    let is_path = |end: &str| end.starts_with("features.") || end.starts_with("cameras.");
+    let [one, other] = [one, other].map(|end| if is_path(end) { end.to_owned() } else { format!("features.{end}") });
+    let [length, sd] = metres(length)?;
+    Ok(Length { between: Ends::new([&one, &other]).map_err(|_| expected())?, length, sd })
 }
 
-fn metres(text: &str) -> Result<f64, String> {
-    let metres = text.parse::<f64>().ok().filter(|metres| *metres > 0.0 && metres.is_finite());
-    metres.ok_or_else(|| "expected a length above 0, in metres".to_owned())
+fn read_tag_side(text: &str) -> Result<[f64; 2], String> {
+    let longest = Length::LONGEST_TAG;
+    let side = metres(text)?;
+    if side[0] < longest {
+        Ok(side)
+    } else {
+        Err(format!("{} is in metres, and no tag is as large as {longest} m", side[0]))
+    }
+}
+
+/// A length, and its standard deviation where one is given.
+fn metres(text: &str) -> Result<[f64; 2], String> {
+    let (length, sd) = text.split_once(',').map_or((text, None), |(length, sd)| (length, Some(sd)));
+    let number = |text: &str| text.parse::<f64>().ok().filter(|metres| *metres > 0.0 && metres.is_finite());
+    let sd = sd.map_or(Some(Length::RULER), number);
+    number(length).zip(sd).map(Into::into).ok_or_else(|| "expected lengths above 0, in metres".to_owned())
 }
 
 impl Calibrate {
@@ -326,6 +344,10 @@ pub fn finding_json(finding: &Finding, words: String) -> Value {
     let mut json = match finding {
         Finding::UnseenCamera { camera } => json!({ "kind": "unseen_camera", "camera": camera }),
         Finding::Misfit { ratio, stated } => with(json!({ "kind": "misfit", "ratio": ratio }), "stated", stated),
+        Finding::FarFromGiven { values } => {
+            let value = |(path, [given, learned], sds): &(String, [f64; 2], f64)| json!({ "path": path, "given": given, "learned": learned, "deviations": sds });
+            json!({ "kind": "far_from_given", "values": values.iter().map(value).collect::<Vec<_>>() })
+        }
         Finding::MissedLength { length, learned } => {
             let (kind, names) = length.between.parts();
             let ends = names.each_ref().map(|name| format!("{kind}.{name}"));

@@ -175,8 +175,8 @@ fn describe(rig: &Rig, file: &str, counts: &Counts) -> String {
     if !targets.is_empty() {
         text += &format!("  targets   {}: {}\n", targets.len(), list(&targets));
     }
-    if let Some(side) = rig.estimate.tag_side {
-        text += &format!("  measured  the sides of tags: {:.2} mm\n", 1e3 * side);
+    if let Some([side, sd]) = rig.estimate.tag_side {
+        text += &format!("  measured  the sides of tags: {:.2} ± {:.2} mm\n", 1e3 * side, 1e3 * sd);
     }
     for length in &rig.estimate.lengths {
         let (mm, sd) = (1e3 * length.length, 1e3 * length.sd);

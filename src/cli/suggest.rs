@@ -63,8 +63,8 @@ impl Suggest {
             check_output(output, &inputs)?;
         }
         let options = SuggestOptions { count: self.count, seed: self.seed };
-        let known = known.as_ref().map(|known| &known.rig);
-        let suggestion = suggest(&input.rig, recording.as_ref(), known, &options)?;
+        let known = known.map(|known| with_lengths(known.rig, &input.rig));
+        let suggestion = suggest(&input.rig, recording.as_ref(), known.as_ref(), &options)?;
         let mut answer = Answer::new(text(&input.rig, &suggestion), json(&suggestion));
         if let Some(output) = &self.output {
             to_visit(&input.rig, &suggestion).write(output)?;
@@ -74,6 +74,17 @@ impl Suggest {
         }
         Ok(answer)
     }
+}
+
+/// The rig that was given, with what was measured besides when the other was learned.
+fn with_lengths(mut given: Rig, learned: &Rig) -> Rig {
+    given.estimate.tag_side = given.estimate.tag_side.or(learned.estimate.tag_side);
+    for length in &learned.estimate.lengths {
+        if !given.estimate.lengths.contains(length) {
+            given.estimate.lengths.push(length.clone());
+        }
+    }
+    given
 }
 
 /// The positions as a recording in which nothing was seen yet.

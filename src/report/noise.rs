@@ -100,7 +100,8 @@ fn is_named(rig: &Rig, residual: &Residual, findings: &[Finding]) -> bool {
         Finding::Outliers { .. }
         | Finding::UnseenCamera { .. }
         | Finding::Misfit { .. }
-        | Finding::MissedLength { .. } => false,
+        | Finding::MissedLength { .. }
+        | Finding::FarFromGiven { .. } => false,
     };
     findings.iter().any(is_meant)
 }

@@ -114,8 +114,17 @@ pub(super) fn steps(subject: &Subject<'_>) -> Vec<String> {
         }
     }
     steps.extend(cures.into_iter().take(3).map(|cure| format!("To determine more: {cure}.")));
+    let is_length = |finding: &Finding| matches!(finding, Finding::MissedLength { .. } | Finding::FarFromGiven { .. });
+    if report.findings.iter().any(is_length) {
+        let check = "Check what was given: the robot that the rig names, and every length. One of them contradicts the recording, and no figure in \
+             millimetres holds before it is right.";
+        steps.insert(0, check.to_owned());
+    }
     let explained = |finding: &Finding| {
-        misfit(finding) || moved(finding).is_some() || (changed.is_some() && change::sample_of(finding).is_some())
+        misfit(finding)
+            || is_length(finding)
+            || moved(finding).is_some()
+            || (changed.is_some() && change::sample_of(finding).is_some())
     };
     if report.findings.iter().any(|finding| !explained(finding)) {
         steps.push(

@@ -216,8 +216,9 @@ pub struct Estimate {
     pub prior: BTreeMap<String, f64>,
     /// Distances that were measured.
     pub lengths: Vec<Length>,
-    /// Side of all tags whose corners are features, `FAMILY:ID/0` to `/3` around the tag [m]; known as well as [`Length::RULER`] says.
-    pub tag_side: Option<f64>,
+    /// Side of all tags whose corners are features, `FAMILY:ID/0` to `/3` around the tag, and its standard deviation [m]: one measurement, as
+    /// all come from one printer.
+    pub tag_side: Option<[f64; 2]>,
 }
 
 /// A distance that was measured, with a ruler or on a drawing.
@@ -234,6 +235,8 @@ pub struct Length {
 impl Length {
     /// Standard deviation of what a ruler or a drawing tells [m].
     pub const RULER: f64 = 5e-4;
+    /// No side of a tag is longer [m].
+    pub const LONGEST_TAG: f64 = 2.0;
 }
 
 /// The ends of a [`Length`], by name; both are fixed to the same thing.

@@ -150,7 +150,8 @@ fn write_estimate(table: &mut dyn TableLike, before: &Estimate, now: &Estimate) 
     }
     if before.tag_side != now.tag_side {
         match now.tag_side {
-            Some(side) => set(table, "tag_side", number(side)),
+            Some([side, Length::RULER]) => set(table, "tag_side", number(side)),
+            Some(side) => set(table, "tag_side", numbers(&side)),
             None => drop(table.remove("tag_side")),
         }
     }

@@ -108,25 +108,53 @@ fn the_side_of_tags_makes_everything_metric() {
     let (said, _) = folder.expect(0, "calibrate rec.jsonl --tag-side 0.06 -o learned.toml");
     assert!(!said.contains("nothing metric"), "{said}");
     let learned = Rig::parse(&folder.read("learned.toml"), "learned.toml").unwrap();
-    assert_eq!(learned.estimate.tag_side, Some(0.06));
+    assert_eq!(learned.estimate.tag_side, Some([0.06, Length::RULER]));
     let length = |rig: &Rig| rig.robot.joints[1].a.unwrap().abs();
     assert!((length(&learned) / length(&rig) - 1.0).abs() < 0.01, "{} of {}", length(&learned), length(&rig));
     folder.write("start.toml", "[estimate]\ntag_side = 0.06\n");
     folder.expect(0, "calibrate rec.jsonl --rig start.toml -o again.toml");
     let again = Rig::parse(&folder.read("again.toml"), "again.toml").unwrap();
     assert_eq!((again.robot, again.cameras), (learned.robot, learned.cameras));
-    let edge = "features.tag36h11:0/0,features.tag36h11:0/1=0.06";
+    let edge = "tag36h11:0/0,tag36h11:0/1=0.06,0.0001";
     folder.expect(0, &format!("calibrate rec.jsonl --length {edge} -o by-length.toml"));
     let by_length = Rig::parse(&folder.read("by-length.toml"), "by-length.toml").unwrap();
     assert!((length(&by_length) / length(&rig) - 1.0).abs() < 0.02);
     folder.expect(0, "simulate ur5 --samples 40 -o other.jsonl");
     let (_, complaint) = folder.expect(2, "calibrate other.jsonl --tag-side 0.06 -o none.toml");
     assert!(complaint.contains("no tag has its four corners"), "{complaint}");
-    for wrong in
-        ["--length f0,f1=0.1", "--length features.f0=0.1", "--length features.f0,features.f1=-1", "--tag-side 0"]
-    {
+    for wrong in [
+        "--length f0,cameras.left=0.1",
+        "--length f0=0.1",
+        "--length f0,f1=-1",
+        "--tag-side 0",
+        "--tag-side 60",
+        "--tag-side 0.06,0",
+    ] {
         folder.expect(2, &format!("calibrate other.jsonl {wrong} -o none.toml"));
     }
+}
+
+/// A length that is wrong by a fifth moves an arm whose links are known far from them, which is told.
+#[test]
+fn an_arm_that_a_wrong_length_stretches_is_told() {
+    let truth = catalog::rig("ur5").unwrap();
+    let mut rig = Rig { robot: truth.robot.clone(), ..nothing(&truth) };
+    let edge = ends(Ends::Features, [&truth.features[0].name, &truth.features[7].name]);
+    let off = 0.2 * distance(&truth, &edge);
+    let far = |rig: &Rig| {
+        let findings = learn(rig, &record(&truth, 40, 1)).unwrap().report.findings;
+        findings
+            .into_iter()
+            .find_map(|finding| if let Finding::FarFromGiven { values } = finding { Some(values) } else { None })
+    };
+    assert_eq!(far(&rig), None);
+    rig.estimate.lengths = vec![measured(&truth, edge.clone(), 0.0, 1e-4)];
+    assert_eq!(far(&rig), None);
+    rig.estimate.lengths = vec![measured(&truth, edge, off, 1e-4)];
+    let values = far(&rig).unwrap();
+    let (path, [given, learned], sds) = &values[0];
+    assert!(path == "robot.joints.shoulder_lift.a" || path == "robot.joints.elbow.a", "{path}");
+    assert!((learned / given - 1.2).abs() < 0.05 && *sds > 5.0, "{given} {learned} {sds}");
 }
 
 #[test]

@@ -74,7 +74,8 @@ fn a_page_answers_first_whether_the_fit_is_good_how_well_the_tip_is_known_and_wh
     let summary = section(&page, "summary");
     assert_eq!(summary.matches("left out").count(), 5, "the figure, the heading and three findings: {summary}");
     for camera in ["left", "right"] {
-        assert!(summary.contains(&format!("the pose of camera `{camera}` is known to ")), "{camera}: {summary}");
+        let against_arm = format!("the pose of camera `{camera}` against the arm is known to ");
+        assert!(summary.contains(&against_arm), "{camera}: {summary}");
     }
     // Cells of what moves together stay short.
     let cells = section(&page, "open").split("<td>").skip(1).map(|cell| cell.split("</td>").next().unwrap());

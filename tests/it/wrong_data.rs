@@ -28,7 +28,10 @@ fn named(learned: &Calibration) -> Vec<Named> {
         Finding::CameraMoved { camera, .. } => Some(Named::Moved(camera.clone())),
         Finding::UnseenCamera { camera } => Some(Named::Unseen(camera.clone())),
         Finding::Misfit { .. } => Some(Named::Misfit),
-        Finding::Outliers { .. } | Finding::UnknownState { .. } | Finding::MissedLength { .. } => None,
+        Finding::Outliers { .. }
+        | Finding::UnknownState { .. }
+        | Finding::MissedLength { .. }
+        | Finding::FarFromGiven { .. } => None,
     };
     let mut named: Vec<Named> = learned.report.findings.iter().filter_map(name).collect();
     named.sort();

@@ -115,6 +115,7 @@ impl Account<'_> {
             noise: None,
             findings: Vec::new(),
             tip: None,
+            camera_poses: Vec::new(),
             weak: Vec::new(),
             influence: Vec::new(),
             targets: Some(targets),

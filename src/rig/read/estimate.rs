@@ -28,8 +28,20 @@ pub(super) fn read_estimate(node: &Node, rig: &Rig) -> Result<Estimate, Error> {
             Some(list) => list.value.list()?.iter().map(|node| read_length(node, rig)).collect::<Result<_, Error>>()?,
             None => Vec::new(),
         },
-        tag_side: fields.optional("tag_side", Node::positive)?,
+        tag_side: fields.optional("tag_side", read_tag_side)?,
     })
+}
+
+/// A length [m], or `[length, sd]`.
+fn read_tag_side(node: &Node) -> Result<[f64; 2], Error> {
+    let [side, sd] = if node.is_list() { node.numbers::<2>()? } else { [node.number()?, Length::RULER] };
+    if !(side > 0.0 && side < Length::LONGEST_TAG && sd > 0.0 && sd.is_finite()) {
+        let longest = Length::LONGEST_TAG;
+        return Err(
+            node.error(format!("is a length in metres below {longest}, or [length, sd], found {side} and {sd}"))
+        );
+    }
+    Ok([side, sd])
 }
 
 /// `{ between = ["features.A", "features.B"], length = 0.12, sd = 0.0005 }`, or between two cameras.
