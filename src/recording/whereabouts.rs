@@ -47,7 +47,7 @@ impl Whereabouts {
 pub(super) fn note_on_apart(apart: usize) -> Option<String> {
     (apart > 0).then(|| {
         format!(
-            "{apart} times the robot moved by more than {} mrad or mm from one camera's image to the next, so that each is a sample of its own",
+            "{apart} times the robot moved by more than {} mrad or mm from one camera's image to the next, so that each is a sample of its own, with the joints of its own time",
             1e3 * STILL
         )
     })
