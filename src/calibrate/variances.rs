@@ -187,14 +187,19 @@ impl Components {
     }
 }
 
+/// Noise of readings and motions below this is none, however it goes on to shrink [rad or m]: images show nothing of it.
+const NONE: f64 = 5e-5;
+
 /// Largest relative change of a standard deviation.
 pub(super) fn change(a: &Noise, b: &Noise) -> f64 {
-    let all = |noise: &Noise| {
-        let Noise { pixels, points, joints, pose, joint_action, pose_action, target: _ } = *noise;
-        [pixels, points, joints, pose.xyz, pose.rot, joint_action, pose_action.xyz, pose_action.rot]
+    let seen = |noise: &Noise| [noise.pixels, noise.points];
+    let told = |noise: &Noise| {
+        let Noise { joints, pose, joint_action, pose_action, .. } = *noise;
+        [joints, pose.xyz, pose.rot, joint_action, pose_action.xyz, pose_action.rot]
     };
-    let pairs = all(a).into_iter().zip(all(b));
-    pairs.filter(|(a, _)| *a > 0.0).map(|(a, b)| (b / a - 1.0).abs()).fold(0.0, f64::max)
+    let of_images = seen(a).into_iter().zip(seen(b));
+    let of_robot = told(a).into_iter().zip(told(b)).filter(|(a, b)| a.max(*b) > NONE);
+    of_images.chain(of_robot).filter(|(a, _)| *a > 0.0).map(|(a, b)| (b / a - 1.0).abs()).fold(0.0, f64::max)
 }
 
 /// Adds the error of a pose to its two components, and returns its leverage.

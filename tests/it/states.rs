@@ -247,3 +247,15 @@ fn standard_deviations_cover_the_truth_where_the_noise_of_joints_is_known() {
     }
     assert!(squares.iter().all(|sum| (61.9..149.5).contains(sum)), "{squares:.1?}");
 }
+
+/// Joints that were read exactly have no noise, which the estimation finds in the end and says so.
+#[test]
+fn the_noise_of_exact_readings_is_found_to_be_none() {
+    let truth = noisy(1, |_| ());
+    let recording = record(&truth, 60, 1).recording;
+    let options = Options { estimate_noise: true, ..Options::default() };
+    let learned = calibrate(&nothing(&truth), &recording, &options, &mut |_| ControlFlow::Continue(())).unwrap();
+    let noise = learned.report.noise.unwrap();
+    assert!(learned.report.converged && noise.joints < 5e-5, "{noise:?}");
+    assert!((noise.pixels / truth.noise.pixels - 1.0).abs() < 0.1, "{noise:?}");
+}
