@@ -114,7 +114,7 @@ fn a_scale_is_found_where_there_is_one_and_not_in_the_noise_of_a_few_poses() {
     let with_scale = |poses: usize, scale: Option<f64>| {
         let is_found = |seed: &u64| {
             let mut random = ChaCha8Rng::seed_from_u64(*seed);
-            let world = world(&mut random, seed % 2 == 0);
+            let world = world(&mut random, seed.is_multiple_of(2));
             let tips: Vec<Pose> = (0..poses).map(|_| pose(&mut random, 1.0, 0.3)).collect();
             let spoilt = Spoilt { target, scale, ..Spoilt::default() };
             let samples = tips.into_iter().map(|tip| world.sample(&mut random, tip, spoilt)).collect();
