@@ -51,6 +51,7 @@ def run_blocks(readme, count, swap=("", "")):
 
 def test_the_code_of_the_readme_runs(tmp_path, monkeypatch, capsys, ur5, motions):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["calibrate_bag.py"])
     # The robot of the bag is one with cameras, which can be simulated.
     spec = importlib.util.spec_from_file_location("calibrate_bag", FOLDER / "examples" / "calibrate_bag.py")
     example = importlib.util.module_from_spec(spec)
