@@ -51,7 +51,7 @@ pub fn calibrate(
     for (one, other, length) in lengths.unwrap_or_default() {
         let between =
             rig::Ends::new([&one, &other]).map_err(|problem| PyValueError::new_err(format!("lengths: {problem}")))?;
-        before.estimate.lengths.push(rig::Length { between, length, sd: rig::Length::RULER });
+        before.estimate.measure(rig::Length { between, length, sd: rig::Length::RULER });
     }
     let options = Options { seed, estimate_noise, influence };
     let recording = recording.inner.clone();

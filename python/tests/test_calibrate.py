@@ -146,6 +146,8 @@ def test_a_measured_length_tells_how_large_everything_is(motions, ur5):
     for wrong in (0.0, -0.1, float("nan")):
         with pytest.raises(handeye.UnusableInput, match="above 0"):
             handeye.calibrate(motions, lengths=[("features.f0", "features.f7", wrong)])
+    with pytest.raises(handeye.UnusableInput, match="below 2 m"):
+        handeye.calibrate(motions, tag_side=60.0)
     with pytest.raises(handeye.UnusableInput, match="no tag has its four corners"):
         handeye.calibrate(motions, tag_side=0.06)
 

@@ -8,7 +8,7 @@ use super::residuals::whitened;
 use super::setup::Setup;
 use super::stage::{Stage, Stages};
 use super::weak::Combination;
-use super::{TipDeviation, gauge, poorly, variances};
+use super::{TipDeviation, gauge, lengths, poorly, variances};
 use crate::calibrate::graph::State;
 use crate::factors::ForwardKinematics;
 use crate::rig::{CameraField, JointField, Parameter};
@@ -66,6 +66,7 @@ impl<'a> Honest<'a> {
         };
         let mut setup = stages.setup.clone();
         (setup.rig.noise.pixels, setup.rig.noise.points) = (shown(Kind::Pixels), shown(Kind::Points));
+        lengths::leave_out_missed(&mut setup, state);
         Honest { setup, priors: stages.priors, loss: Loss::Squared }
     }
 

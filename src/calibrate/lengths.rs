@@ -4,7 +4,7 @@ use super::graph::{Built, State};
 use super::setup::Setup;
 use crate::Error;
 use crate::factors::{OriginDistance, PointDistance};
-use crate::rig::{Ends, Feature, Length, Model, Rig};
+use crate::rig::{Ends, Estimate, Feature, Length, Model, Rig};
 use handeye_solvers::Loss;
 use std::f64::consts::SQRT_2;
 
@@ -46,12 +46,14 @@ impl Found {
 
 /// Everything that was measured, with its ends.
 ///
-/// Errors: those of [`Found::new`], and [`Error::Unusable`] where a number is not above 0, or the side of tags is given and there are none.
+/// Errors: those of [`Found::new`], and [`Error::Unusable`] where a number is not what it may be, or the side of tags is given and there are none.
 pub(crate) fn find(rig: &Rig) -> Result<Vec<(Length, Found)>, Error> {
-    let of_tags = rig.estimate.tag_side.into_iter().flatten();
-    let mut numbers = rig.estimate.lengths.iter().flat_map(|length| [length.length, length.sd]).chain(of_tags);
+    let mut numbers = rig.estimate.lengths.iter().flat_map(|length| [length.length, length.sd]);
     if let Some(wrong) = numbers.find(|number| !(*number > 0.0 && number.is_finite())) {
-        return Err(Error::Unusable(format!("`lengths` and `tag_side` of [estimate] are above 0, found {wrong} m")));
+        return Err(Error::Unusable(format!("`lengths` of [estimate] are above 0, found {wrong} m")));
+    }
+    if let Some(problem) = rig.estimate.tag_side.and_then(Estimate::problem_of_tag_side) {
+        return Err(Error::Unusable(format!("`tag_side` of [estimate]: {problem}")));
     }
     let given = rig.estimate.lengths.iter().map(|length| Ok((length.clone(), Found::new(rig, length)?)));
     let mut found: Vec<(Length, Found)> = given.collect::<Result<_, Error>>()?;
@@ -130,11 +132,22 @@ pub(crate) fn measure(setup: &Setup, loss: Loss, built: &mut Built) {
     }
 }
 
-/// Those that the learned rig misses.
+/// How long what was measured is in a rig [m], where the rig misses it.
+fn missed_by((length, found): &(Length, Found), model: &Model) -> Option<f64> {
+    let learned = found.now(model);
+    ((learned - length.length).abs() > MISSED * length.sd).then_some(learned)
+}
+
+/// What is told of those that the learned rig misses.
 pub(crate) fn missed(setup: &Setup, state: &State) -> impl Iterator<Item = Finding> {
-    setup.lengths.iter().filter_map(|(length, found)| {
-        let learned = found.now(&state.model);
-        ((learned - length.length).abs() > MISSED * length.sd)
-            .then(|| Finding::MissedLength { length: length.clone(), learned })
-    })
+    let told = |one: &(Length, Found)| {
+        let learned = missed_by(one, &state.model)?;
+        Some(Finding::MissedLength { length: one.0.clone(), learned })
+    };
+    setup.lengths.iter().filter_map(told)
+}
+
+/// Leaves out those that the learned rig misses: they tell nothing of it.
+pub(crate) fn leave_out_missed(setup: &mut Setup, state: &State) {
+    setup.lengths.retain(|one| missed_by(one, &state.model).is_none());
 }

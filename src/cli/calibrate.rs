@@ -67,7 +67,7 @@ pub struct Calibrate {
     #[arg(long, value_name = "A,B=METRES[,SD]", value_parser = read_length)]
     length: Vec<Length>,
     /// The side of all tags whose corners are features, and its standard deviation [m] [default: 0.0005]
-    #[arg(long, value_name = "METRES[,SD]", value_parser = read_tag_side)]
+    #[arg(long, value_name = "METRES[,SD]", value_parser = metres)]
     tag_side: Option<[f64; 2]>,
     /// Seed of every random choice: the same seed gives the same rig
     #[arg(long, value_name = "S", default_value_t = Options::default().seed)]
@@ -91,16 +91,6 @@ fn read_length(text: &str) -> Result<Length, String> {
     let [one, other] = [one, other].map(|end| if is_path(end) { end.to_owned() } else { format!("features.{end}") });
     let [length, sd] = metres(length)?;
     Ok(Length { between: Ends::new([&one, &other]).map_err(|_| expected())?, length, sd })
-}
-
-fn read_tag_side(text: &str) -> Result<[f64; 2], String> {
-    let longest = Length::LONGEST_TAG;
-    let side = metres(text)?;
-    if side[0] < longest {
-        Ok(side)
-    } else {
-        Err(format!("{} is in metres, and no tag is as large as {longest} m", side[0]))
-    }
 }
 
 /// A length, and its standard deviation where one is given.
@@ -127,7 +117,7 @@ impl Calibrate {
             }
         }
         let (mut rig, text) = input.map_or_else(|| (Rig::default(), None), |input| (input.rig, Some(input.text)));
-        rig.estimate.lengths.extend(self.length.iter().cloned());
+        self.length.iter().for_each(|length| rig.estimate.measure(length.clone()));
         rig.estimate.tag_side = self.tag_side.or(rig.estimate.tag_side);
         let options = Options { seed: self.seed, estimate_noise: self.estimate_noise, influence: self.influence };
         let bar = Bar::new(is_json);

@@ -17,7 +17,7 @@ pub struct Reading {
 /// All of them but the one whose name `infer` has for another too.
 #[derive(Args, Clone, Default)]
 pub struct OfFiles {
-    /// Names of the joints from base to tip [default: those of the rig, else of the first joint state or of the columns]
+    /// Names of the joints from base to tip [default: those of the rig, else of the joint state that has most, or of the columns]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     joints: Vec<String>,
     /// What is known of a camera: the size of its images, or a calibration file (ROS, OpenCV, Kalibr), whose lens replaces any other
@@ -112,7 +112,7 @@ pub struct OfBags {
     /// Topics of detections, with the camera's name where it is not that of the frame [default: all]
     #[arg(long, value_name = "TOPIC[=CAMERA],...", value_delimiter = ',')]
     camera_topic: Vec<String>,
-    /// Images at most this far apart make one sample [s] [default: half the time between two images]
+    /// Images at most this far apart make one sample [s] [default: half the time between two images, unless the robot moved between them]
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     join: Option<f64>,
 }

@@ -79,11 +79,8 @@ impl Suggest {
 /// The rig that was given, with what was measured besides when the other was learned.
 fn with_lengths(mut given: Rig, learned: &Rig) -> Rig {
     given.estimate.tag_side = given.estimate.tag_side.or(learned.estimate.tag_side);
-    for length in &learned.estimate.lengths {
-        if !given.estimate.lengths.contains(length) {
-            given.estimate.lengths.push(length.clone());
-        }
-    }
+    let of_given = std::mem::take(&mut given.estimate.lengths);
+    learned.estimate.lengths.iter().cloned().chain(of_given).for_each(|length| given.estimate.measure(length));
     given
 }
 

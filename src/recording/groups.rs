@@ -68,14 +68,14 @@ pub(super) fn moments(groups: &[Group], images: &[Image]) -> Vec<i64> {
     moments
 }
 
-/// Takes those groups apart between whose first and last image [ns] the robot `moved`: a sample has one state. Returns how many these were.
+/// Takes those groups apart between whose images [ns] the robot `moved`: a sample has one state. Returns how many these were.
 pub(super) fn split(groups: Vec<Group>, images: &[Image], moved: impl Fn(i64, i64) -> bool) -> (Vec<Group>, usize) {
     let mut count = 0;
     let mut all = Vec::with_capacity(groups.len());
     for group in groups {
         let stamp = |index: &usize| images[*index].stamp;
-        let [first, last] = [group.images.first(), group.images.last()].map(|index| index.map_or(0, stamp));
-        if group.spread == 0 || !moved(first, last) {
+        let first = stamp(&group.images[0]);
+        if group.spread == 0 || !group.images.iter().any(|index| moved(first, stamp(index))) {
             all.push(group);
             continue;
         }
@@ -84,7 +84,15 @@ pub(super) fn split(groups: Vec<Group>, images: &[Image], moved: impl Fn(i64, i6
         all.extend(at_once.map(|images| Group { time: stamp(&images[0]), images: images.to_vec(), spread: 0 }));
     }
     all.sort_by_key(|group| group.time);
-    (all, count)
+    // What one group and the next have at the same time belongs together.
+    let mut merged: Vec<Group> = Vec::with_capacity(all.len());
+    for group in all {
+        match merged.last_mut().filter(|last| last.time == group.time && last.spread == 0 && group.spread == 0) {
+            Some(last) => last.images.extend(group.images),
+            None => merged.push(group),
+        }
+    }
+    (merged, count)
 }
 
 /// The smallest median of the times between two images of one camera [ns]; 0 where none has two.

@@ -106,8 +106,9 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Opened, Error> {
         Format::JsonLines => {
             let mut recording = Recording::read(path)?;
             let described = recording.describe_those_there(&options.cameras);
-            described.map_err(|problem| Error::Unusable(format!("{}: {problem}", path.display())))?;
-            let notes = recording.take_joints(&options.known_joints);
+            let unusable = |problem: String| Error::Unusable(format!("{}: {problem}", path.display()));
+            described.map_err(unusable)?;
+            let notes = recording.take_joints(&options.known_joints).map_err(unusable)?;
             Ok(Opened { recording, notes, images: Vec::new() })
         }
         Format::Bag => bag::read(path, options, None),

@@ -4,11 +4,13 @@ use super::same_joints::{Places, places, several};
 
 impl Recording {
     /// Takes the joints that a rig calls so in its order, where the recording has all of them and not just so; what has to be said of it.
-    pub(super) fn take_joints(&mut self, of_rig: &[String]) -> Vec<String> {
+    ///
+    /// Errors: in words, where several may be those of the rig.
+    pub(super) fn take_joints(&mut self, of_rig: &[String]) -> Result<Vec<String>, String> {
         let places = match places(of_rig, &self.joints) {
             Places::Found(places) if !places.iter().copied().eq(0..self.joints.len()) => places,
-            Places::Several(first) => return vec![several(&first)],
-            Places::Found(_) | Places::Missing => return Vec::new(),
+            Places::Several(first) => return Err(format!("{}: take the others out", several(&first))),
+            Places::Found(_) | Places::Missing => return Ok(Vec::new()),
         };
         let names: Vec<String> = places.iter().map(|place| self.joints[*place].clone()).collect();
         let taken = |row: &Vec<f64>| places.iter().map(|place| row[*place]).collect::<Vec<f64>>();
@@ -21,7 +23,7 @@ impl Recording {
             let (ours, theirs) = (names.join(", "), before.join(", "));
             format!("joints are taken by their names, in the order of the rig: {ours}; the file has them in the order {theirs}")
         });
-        order.into_iter().chain(note_on_others(&before, &names)).collect()
+        Ok(order.into_iter().chain(note_on_others(&before, &names)).collect())
     }
 }
 

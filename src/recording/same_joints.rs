@@ -11,18 +11,6 @@ pub(crate) enum Places {
     Missing,
 }
 
-impl Places {
-    /// The places, where all are found.
-    pub(super) fn found(self) -> Option<Vec<usize>> {
-        if let Places::Found(places) = self { Some(places) } else { None }
-    }
-
-    /// What the rig's first joint may be, where all are there more than once.
-    pub(super) fn several(&self) -> Option<&[String]> {
-        if let Places::Several(first) = self { Some(first) } else { None }
-    }
-}
-
 /// Where the names of a rig stand among those of a recording: as they are, or all of them within the same prefix and suffix, or without those
 /// that they have in common, which end and begin where words do: `elbow` is `left_elbow_joint` where `wrist` is `left_wrist_joint`.
 pub(crate) fn places(rig: &[String], recording: &[String]) -> Places {
@@ -60,10 +48,7 @@ pub(super) fn are_those(rig: &[String], recording: &[String]) -> bool {
 
 /// What has to be said where a rig's joints are there more than once; `first`: what its first joint may be.
 pub(super) fn several(first: &[String]) -> String {
-    format!(
-        "several joints may be the rig's, whose first would be {}: --joints names those that are meant",
-        first.join(" or ")
-    )
+    format!("several joints may be the rig's, whose first would be {}", first.join(" or "))
 }
 
 /// What stands before and after a name wherever another holds it as whole words.

@@ -32,7 +32,7 @@ pub(in crate::recording) struct Track<T> {
 }
 
 /// A value at a moment, and how far apart the two are that it lies between [ns].
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(in crate::recording) struct At<T> {
     pub value: T,
     pub gap: i64,

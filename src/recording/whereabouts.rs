@@ -32,13 +32,13 @@ impl Whereabouts {
     }
 
     /// Those of groups of images, whose times are among the moments, in place of the moments.
-    pub fn of(mut self, groups: &[Group]) -> Whereabouts {
+    pub fn of(&self, groups: &[Group]) -> Whereabouts {
         let place = |group: &Group| self.moments.binary_search(&group.time).ok();
         let places: Vec<usize> = groups.iter().filter_map(place).collect();
         Whereabouts {
             moments: groups.iter().map(|group| group.time).collect(),
-            joints: places.iter().map(|&place| self.joints[place].take()).collect(),
-            poses: places.iter().map(|&place| self.poses[place].take()).collect(),
+            joints: places.iter().map(|&place| self.joints[place].clone()).collect(),
+            poses: places.iter().map(|&place| self.poses[place].clone()).collect(),
         }
     }
 }
@@ -47,7 +47,7 @@ impl Whereabouts {
 pub(super) fn note_on_apart(apart: usize) -> Option<String> {
     (apart > 0).then(|| {
         format!(
-            "{apart} times the robot moved by more than {} mrad or mm from one camera's image to the next, so that each is a sample of its own, with the joints of its own time",
+            "{apart} times the robot moved by more than {} mrad or mm from one camera's image to the next, or its readings are as noisy, so that each is a sample of its own, with the joints of its own time",
             1e3 * STILL
         )
     })

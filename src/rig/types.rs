@@ -235,8 +235,23 @@ pub struct Length {
 impl Length {
     /// Standard deviation of what a ruler or a drawing tells [m].
     pub const RULER: f64 = 5e-4;
-    /// No side of a tag is longer [m].
-    pub const LONGEST_TAG: f64 = 2.0;
+}
+
+/// No side of a tag is longer [m].
+const LONGEST_TAG: f64 = 2.0;
+
+impl Estimate {
+    /// Takes a measured length, in place of one between the same ends.
+    pub fn measure(&mut self, length: Length) {
+        self.lengths.retain(|known| known.between != length.between);
+        self.lengths.push(length);
+    }
+
+    /// What is wrong with the measured side of a tag and its standard deviation [m]; `None` where they may be.
+    pub(crate) fn problem_of_tag_side([side, sd]: [f64; 2]) -> Option<String> {
+        let is_fine = side > 0.0 && side < LONGEST_TAG && sd > 0.0 && sd.is_finite();
+        (!is_fine).then(|| format!("the side of a tag is above 0 and below {LONGEST_TAG} m, its standard deviation above 0; found {side} and {sd} m"))
+    }
 }
 
 /// The ends of a [`Length`], by name; both are fixed to the same thing.

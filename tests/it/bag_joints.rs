@@ -168,8 +168,31 @@ fn joints_of_a_driver_are_those_of_the_rig_in_the_order_of_the_rig() {
         let arms = names(["left_a", "left_b", "right_a", "right_b"]);
         vec![state("/joint_states", time, &arms, &[seconds, 0.5 * seconds, 0.0, 0.0])]
     });
-    let error = read_with(&images_beside(4, &both), &folder, &options).unwrap_err().to_string();
-    assert!(error.contains("left_a or right_a: --joints names those that are meant"), "{error}");
+    let several = |messages: &[Message]| {
+        let error = read_with(&images_beside(4, messages), &folder, &options).unwrap_err().to_string();
+        assert!(error.contains("left_a or right_a: --joints names those that are meant"), "{error}");
+    };
+    several(&both);
+    // In turn on one topic, in either order.
+    let in_turn = |first: [&str; 2], second: [&str; 2]| {
+        messages(|time, seconds| {
+            let positions = [seconds, 0.5 * seconds];
+            [first, second].map(|arm| state("/joint_states", time, &names(arm), &positions)).to_vec()
+        })
+    };
+    several(&in_turn(["left_a", "left_b"], ["right_a", "right_b"]));
+    several(&in_turn(["right_a", "right_b"], ["left_a", "left_b"]).into_iter().rev().collect::<Vec<_>>());
+    // Just so comes before any prefix, whatever came first, and a state of which positions are missing hides nothing.
+    for joints in [["left_a", "left_b"], ["b", "a"]] {
+        let mut states = in_turn(joints, ["a", "b"]);
+        states.insert(0, state("/joint_states", 890_000_000, &names(["a", "b"]), &[7.0]));
+        let found = read_with(&images_beside(4, &states), &folder, &options).unwrap().recording;
+        assert_eq!(found.joints, ["a", "b"], "{joints:?}");
+    }
+    // Named, and there are no states to name them in.
+    let named = OpenOptions { joints: names(["a", "b"]), ..OpenOptions::default() };
+    let error = read_with(&images_beside(4, &[]), &folder, &named).unwrap_err().to_string();
+    assert!(error.contains("has no joint states, of which --joints"), "{error}");
 }
 
 /// Two cameras 20 ms apart, an arm that begins to move at 1.35 s: one joint goes with the time, by 1 rad/s.
@@ -198,4 +221,34 @@ fn images_between_which_the_robot_moved_are_samples_of_their_own_with_the_joints
     let bag = BagOptions { join: Some(0.03), ..BagOptions::default() };
     let joined = read_with(&bytes, &folder, &OpenOptions { bag, ..OpenOptions::default() }).unwrap().recording;
     assert_eq!(joined.samples.len(), 8);
+}
+
+/// Three images of which the outer two look at the same, and one of another group at the very time of one that is taken apart.
+#[test]
+fn every_image_counts_in_whether_the_robot_moved_and_none_loses_its_joints() {
+    let folder = Folder::new("bag-back");
+    let there_and_back = |seconds: f64| 0.5 - 25.0 * (seconds - 1.02).abs();
+    let joints = |angle: &dyn Fn(f64) -> f64| -> Vec<Message> {
+        let times = (0..90).map(|index| 950_000_000 + 10_000_000 * index);
+        times.map(|time| state("/joint_states", time, &names(["a"]), &[angle(time as f64 / 1e9)])).collect()
+    };
+    let mut beside = joints(&there_and_back);
+    beside.push(image("/right/tags", "right", 1_020_000_000));
+    beside.push(image("/top/tags", "top", 1_040_000_000));
+    // Two images of one camera are 0.1 s apart.
+    let recording = read_with(&images_beside(2, &beside), &folder, &OpenOptions::default()).unwrap().recording;
+    let read: Vec<f64> = recording.samples.iter().map(|sample| sample.joints.as_ref().unwrap()[0]).collect();
+    assert_eq!(recording.samples.len(), 4);
+    assert!(read.iter().zip([0.0, 0.5, 0.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{read:?}");
+
+    let mut beside = joints(&|seconds| seconds);
+    beside.push(image("/right/tags", "right", 1_020_000_000));
+    beside.push(image("/left/tags", "left", 1_020_000_000));
+    let recording = read_with(&images_beside(3, &beside), &folder, &OpenOptions::default()).unwrap().recording;
+    for sample in &recording.samples {
+        let (time, read) = (sample.time.unwrap(), sample.joints.as_ref().unwrap()[0]);
+        assert!((time - read).abs() < 1e-9, "{time} {read}");
+    }
+    let at = |time: f64| recording.samples.iter().filter(|sample| (sample.time.unwrap() - time).abs() < 1e-9).count();
+    assert_eq!((recording.samples.len(), at(1.02)), (4, 1));
 }

@@ -86,6 +86,10 @@ fn a_length_that_contradicts_what_is_known_is_told() {
         let is_it = |finding: &Finding| matches!(finding, Finding::MissedLength { length: told, .. } if told == length);
         report.findings.iter().any(is_it)
     };
+    // What is not believed tells nothing of how well the tip is known.
+    let (_, alone) = learned_with(&truth, vec![right.clone()], 3);
+    let [both, alone] = [&report, &alone].map(|report| report.tip.unwrap().median);
+    assert!((both / alone - 1.0).abs() < 0.02, "{both} {alone}");
     assert!(told(&wrong) && !told(&right) && report.findings.len() == 1, "{:?}", report.findings);
 }
 
@@ -119,6 +123,10 @@ fn the_side_of_tags_makes_everything_metric() {
     folder.expect(0, &format!("calibrate rec.jsonl --length {edge} -o by-length.toml"));
     let by_length = Rig::parse(&folder.read("by-length.toml"), "by-length.toml").unwrap();
     assert!((length(&by_length) / length(&rig) - 1.0).abs() < 0.02);
+    // Said again, it is still one measurement.
+    folder.expect(0, &format!("calibrate rec.jsonl --rig by-length.toml --length {edge} -o by-length.toml"));
+    let again = Rig::parse(&folder.read("by-length.toml"), "by-length.toml").unwrap();
+    assert_eq!(again.estimate.lengths, by_length.estimate.lengths);
     folder.expect(0, "simulate ur5 --samples 40 -o other.jsonl");
     let (_, complaint) = folder.expect(2, "calibrate other.jsonl --tag-side 0.06 -o none.toml");
     assert!(complaint.contains("no tag has its four corners"), "{complaint}");

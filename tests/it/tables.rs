@@ -355,3 +355,30 @@ fn joints_that_are_not_taken_are_told_and_options_without_effect_refused() {
         assert!(error.starts_with(&format!("error: table.csv: {says}")), "{text} {options}: {error}");
     }
 }
+
+/// Commands and speeds have the joints' names too, and are not what was read of them.
+#[test]
+fn columns_beside_the_joints_are_not_taken_for_them() {
+    let folder = Folder::new("tables-beside");
+    let options = OpenOptions { known_joints: vec!["a".to_owned(), "b".to_owned()], ..OpenOptions::default() };
+    let open = |text: &str| csv(&folder, text, &options).map(|opened| opened.recording);
+    let text = "joints.left_b_joint,joints.left_a_joint,joint_action.left_a_joint,joint_action.left_b_joint,velocity.a,velocity.b,l.f.u,l.f.v\n\
+                1,2,0.1,0.2,9,9,5,6\n3,4,0.1,0.2,9,9,5,6\n";
+    let read = open(text).unwrap();
+    assert_eq!(read.joints, ["left_a_joint", "left_b_joint"]);
+    assert_eq!(read.samples[0].joints.as_deref(), Some(&[2.0, 1.0][..]));
+    assert_eq!(read.samples[0].joint_action.as_deref(), Some(&[0.1, 0.2][..]));
+    let bare = open("b,a,a_velocity,b_velocity,l.f.u,l.f.v\n1,2,9,9,5,6\n").unwrap();
+    assert_eq!(bare.samples[0].joints.as_deref(), Some(&[2.0, 1.0][..]));
+    for none in ["velocity.a,velocity.b", "a_velocity,b_velocity", "action.a,action.b"] {
+        let read = open(&format!("{none},l.f.u,l.f.v\n1,2,5,6\n")).unwrap();
+        assert!(read.joints.is_empty() && read.samples[0].joints.is_none(), "{none}: {:?}", read.joints);
+    }
+    let only = open("joint_action.a,joint_action.b,l.f.u,l.f.v\n0.1,0.2,5,6\n0.1,0.2,5,6\n").unwrap();
+    assert_eq!(
+        (&only.joints[..], only.samples[0].joint_action.is_some()),
+        (&["a".to_owned(), "b".to_owned()][..], true)
+    );
+    let error = open("joints.left_a,joints.left_b,joints.right_a,joints.right_b\n1,2,3,4\n").unwrap_err().to_string();
+    assert!(error.contains("left_a or right_a: --joints names those that are meant"), "{error}");
+}

@@ -3,6 +3,7 @@ use super::value::{Texts, Value};
 use crate::recording::OpenOptions;
 use crate::recording::names::joint_name;
 use crate::recording::same_joints::{Places, places, several};
+use std::collections::BTreeSet;
 
 /// The lists of names in joint states, each once, in the order in which they were first met.
 #[derive(Default)]
@@ -30,17 +31,32 @@ impl JointLists {
         }
         let bytes = names.bytes.to_vec();
         if let Ok(names) = names.to_vec() {
-            let names = names.iter().take(positions.len()).map(|name| joint_name(name)).collect();
+            if positions.len() < names.len() {
+                return;
+            }
+            let names = names.iter().map(|name| joint_name(name)).collect();
             self.0.push(List { topic: topic.to_owned(), bytes, names });
         }
     }
 
-    /// The only topic of which a state has all joints that are asked for, or that the rig has.
+    /// The only topic on which all joints are that are asked for, or that the rig has: as they are, or else within a prefix and suffix.
     pub(super) fn topic(&self, options: &OpenOptions) -> Option<&str> {
-        let has_all = |list: &&List| matches!(list.find(options), Places::Found(_));
-        let mut with_all = self.0.iter().filter(has_all).map(|list| list.topic.as_str());
-        let first = with_all.next()?;
-        with_all.all(|other| other == first).then_some(first)
+        let topics: BTreeSet<&str> = self.0.iter().map(|list| list.topic.as_str()).collect();
+        let is_asked = !options.joints.is_empty();
+        let wanted = if is_asked { asked_for(options) } else { options.known_joints.clone() };
+        if wanted.is_empty() {
+            return None;
+        }
+        let has_just_so = |topic: &str| {
+            let names = self.names(topic);
+            wanted.iter().all(|joint| names.contains(joint))
+        };
+        let has_within = |topic: &str| !is_asked && matches!(places(&wanted, &self.names(topic)), Places::Found(_));
+        let which =
+            |is_it: &dyn Fn(&str) -> bool| topics.iter().copied().filter(|topic| is_it(topic)).collect::<Vec<&str>>();
+        let just_so = which(&has_just_so);
+        let found = if just_so.is_empty() { which(&has_within) } else { just_so };
+        if let [topic] = found[..] { Some(topic) } else { None }
     }
 
     /// The joints from base to tip: as asked for, as in the rig where a state has all of those, or else as in the state that has most, of several
@@ -50,19 +66,22 @@ impl JointLists {
     pub(super) fn order(&self, topic: &str, options: &OpenOptions) -> Result<Vec<String>, String> {
         let lists = || self.0.iter().filter(|list| list.topic == topic);
         let Some(longest) = lists().rev().max_by_key(|list| list.names.len()) else { return Ok(Vec::new()) };
-        let found: Vec<(&List, Places)> = lists().map(|list| (list, list.find(options))).collect();
-        for (list, places) in &found {
-            if let Places::Found(places) = places {
-                return Ok(places.iter().map(|place| list.names[*place].clone()).collect());
-            }
-        }
-        if let Some(first) = found.iter().find_map(|(_, places)| places.several()) {
-            return Err(several(first));
-        }
+        let has_all = |wanted: &[String]| lists().any(|list| wanted.iter().all(|joint| list.names.contains(joint)));
         if options.joints.is_empty() {
-            return Ok(longest.names.clone());
+            let names = self.names(topic);
+            return match places(&options.known_joints, &names) {
+                Places::Several(first) => Err(format!("{}: --joints names those that are meant", several(&first))),
+                Places::Found(places) => {
+                    let found: Vec<String> = places.into_iter().map(|place| names[place].clone()).collect();
+                    Ok(if has_all(&found) { found } else { longest.names.clone() })
+                }
+                Places::Missing => Ok(longest.names.clone()),
+            };
         }
         let wanted = asked_for(options);
+        if has_all(&wanted) {
+            return Ok(wanted);
+        }
         let missing = wanted.iter().find(|joint| lists().all(|list| !list.names.contains(joint)));
         let there = lists().map(|list| list.names.join(", ")).collect::<Vec<_>>().join("; ");
         Err(match missing {
@@ -71,20 +90,20 @@ impl JointLists {
         })
     }
 
+    /// All joints of a topic, each once, in the order in which they were first met.
+    fn names(&self, topic: &str) -> Vec<String> {
+        let mut names: Vec<String> = Vec::new();
+        for name in self.0.iter().filter(|list| list.topic == topic).flat_map(|list| &list.names) {
+            if !names.contains(name) {
+                names.push(name.clone());
+            }
+        }
+        names
+    }
+
     /// All joints of all topics.
     pub(super) fn all(&self) -> impl Iterator<Item = &String> {
         self.0.iter().flat_map(|list| &list.names)
-    }
-}
-
-impl List {
-    /// Where the joints are that are asked for, which are called just so, or else those of the rig.
-    fn find(&self, options: &OpenOptions) -> Places {
-        if options.joints.is_empty() {
-            return places(&options.known_joints, &self.names);
-        }
-        let place = |name: &String| self.names.iter().position(|known| known == name);
-        asked_for(options).iter().map(place).collect::<Option<_>>().map_or(Places::Missing, Places::Found)
     }
 }
 

@@ -40,7 +40,8 @@ pub struct BagOptions {
     pub frames: Option<[String; 2]>,
     /// Topics of detections, with the name of the camera where it is not that of the frame; empty: all.
     pub camera_topics: Vec<(String, Option<String>)>,
-    /// Images of several cameras at most this far apart make one sample [s]; `None`: half the time between two images.
+    /// Images of several cameras at most this far apart make one sample [s]; `None`: half the time between two images, unless the robot moved
+    /// between them.
     pub join: Option<f64>,
 }
 
@@ -118,6 +119,9 @@ pub(super) fn read<'a>(
         Some(topic) => {
             images.joints.order(topic, options).map_err(|problem| unusable(format!("{topic}: {problem}")))?
         }
+        None if !options.joints.is_empty() => {
+            return Err(unusable("has no joint states, of which --joints could name some".to_owned()));
+        }
         None => Vec::new(),
     };
     let pose_topic = match &of_bag.pose_topic {
@@ -164,7 +168,7 @@ pub(super) fn read<'a>(
     if options.joints.is_empty() && !joint_names.is_empty() && !are_those(&options.known_joints, &joint_names) {
         let order = joint_names.join(", ");
         notes.push(format!(
-                "joints are in the order of the first joint state: {order}; where that is not from base to tip, give a rig with these names or --joints"
+                "joints are in the order of the joint state that has most: {order}; where that is not from base to tip, give a rig with these names or --joints"
             ));
     }
     let states = joints.into_iter().zip(poses);

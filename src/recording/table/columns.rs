@@ -4,7 +4,7 @@ use crate::error::suggestion;
 use crate::recording::OpenOptions;
 use crate::recording::clock::UNITS;
 use crate::recording::names::{Names, joint_name, natural_order};
-use crate::recording::same_joints::{places, several};
+use crate::recording::same_joints::{Places, places, several};
 use crate::rig::{problem_of_joint_name, problem_of_name};
 use std::collections::BTreeMap;
 
@@ -198,17 +198,16 @@ impl Columns {
             return Err((0, format!("there is no joint `{missing}` {}", suggestion(missing, there))));
         }
         let in_groups: Vec<String> = named.0.iter().map(|(name, _)| name.clone()).collect();
-        let bare: Vec<String> =
-            header.iter().map(|column| joint_name(column.strip_suffix("_deg").unwrap_or(column))).collect();
-        let of_rig = || {
-            let found = [&in_groups, &bare].map(|names| (names, places(known, names)));
-            if let Some(first) = found.iter().find_map(|(_, places)| places.several()) {
-                return Err((0, several(first)));
+        let names = match places(known, &in_groups) {
+            _ if !joints.is_empty() => joints.to_vec(),
+            Places::Found(places) => places.into_iter().map(|place| in_groups[place].clone()).collect(),
+            Places::Several(first) => {
+                return Err((0, format!("{}: --joints names those that are meant", several(&first))));
             }
-            let found = found.into_iter().find_map(|(names, places)| Some((names, places.found()?)));
-            Ok(found.map(|(names, places)| places.into_iter().map(|place| names[place].clone()).collect()))
+            // Other columns are joints where they are called just as the rig calls its own.
+            Places::Missing if !known.is_empty() && all(known).is_some() => known.to_vec(),
+            Places::Missing => in_groups,
         };
-        let names = if joints.is_empty() { of_rig()?.unwrap_or_else(|| in_groups.clone()) } else { joints.to_vec() };
         self.joints = all(&names).unwrap_or_default();
         self.others.retain(|other| !self.joints.iter().any(|joint| header[joint.column] == *other));
         // A column may be asked for by a name that no parameter path can hold.

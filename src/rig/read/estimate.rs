@@ -35,11 +35,8 @@ pub(super) fn read_estimate(node: &Node, rig: &Rig) -> Result<Estimate, Error> {
 /// A length [m], or `[length, sd]`.
 fn read_tag_side(node: &Node) -> Result<[f64; 2], Error> {
     let [side, sd] = if node.is_list() { node.numbers::<2>()? } else { [node.number()?, Length::RULER] };
-    if !(side > 0.0 && side < Length::LONGEST_TAG && sd > 0.0 && sd.is_finite()) {
-        let longest = Length::LONGEST_TAG;
-        return Err(
-            node.error(format!("is a length in metres below {longest}, or [length, sd], found {side} and {sd}"))
-        );
+    if let Some(problem) = Estimate::problem_of_tag_side([side, sd]) {
+        return Err(node.error(problem));
     }
     Ok([side, sd])
 }
