@@ -83,7 +83,7 @@ fn without_names_the_state_of_most_joints_is_the_arm_s_and_two_topics_are_refuse
     let Opened { recording, notes, .. } =
         read_with(&images_beside(4, &in_one_state()), &folder, &OpenOptions::default()).unwrap();
     assert_eq!(recording.joints, ["finger", "a", "b"]);
-    assert!(notes.iter().any(|note| note.contains("first joint state: finger, a, b; where")), "{notes:?}");
+    assert!(notes.iter().any(|note| note.contains("has most: finger, a, b; where")), "{notes:?}");
 }
 
 #[test]
