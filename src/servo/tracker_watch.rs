@@ -6,7 +6,8 @@ use nalgebra::{DMatrix, DVector};
 ///
 /// One that jumps or freezes differs from what the last motion let expect by far more than the others do. One that drifts shows in that no
 /// motion brings its error to 0 together with theirs. Both are judged against the other trackers of the same camera, so that slopes which are
-/// wrong for all of a camera, as when it was moved, accuse none.
+/// wrong for all of a camera, as when it was moved, accuse none. Most of those that a camera sees are right: where more would be left out, the
+/// slopes are wrong, and all are believed.
 #[derive(Debug, Default)]
 pub(super) struct TrackerWatch {
     doubted: Vec<Option<Doubt>>,
@@ -80,6 +81,7 @@ impl TrackerWatch {
                 left -= 1;
             }
         }
+        self.believe_most(errors);
         self.judge_together(estimate, joints.len(), errors);
         for tracker in self.doubted.iter().enumerate().filter(|(_, doubt)| doubt.is_some()).map(|(tracker, _)| tracker)
         {
@@ -103,7 +105,26 @@ impl TrackerWatch {
                 return self.believe_again(estimate, &motion, errors);
             }
             self.doubted[worst] = Some(Doubt::default());
+            if self.believe_most(errors) {
+                return;
+            }
         }
+    }
+
+    /// Believes all trackers of a camera again where half of those that it sees, or more, are doubted; true where there is such a camera.
+    fn believe_most(&mut self, errors: &[f64]) -> bool {
+        let mut any = false;
+        for camera in 0..=self.cameras.iter().copied().max().unwrap_or(0) {
+            let seen = |tracker: &usize| self.cameras[*tracker] == camera && errors[2 * tracker].is_finite();
+            let seen: Vec<usize> = (0..self.doubted.len()).filter(seen).collect();
+            let may_err = |tracker: &&usize| self.doubted[**tracker].is_some_and(|doubt| !doubt.for_good);
+            let doubted: Vec<usize> = seen.iter().filter(may_err).copied().collect();
+            if !doubted.is_empty() && 2 * doubted.len() >= seen.len() {
+                doubted.iter().for_each(|&tracker| self.doubted[tracker] = None);
+                any = true;
+            }
+        }
+        any
     }
 
     /// Believes trackers again whose errors are those that the motion asked for by the others takes away, where that says something.

@@ -67,10 +67,10 @@ pub struct Trust {
     /// Largest motion in one step, as the length of all quantities together [their unit]. Default 0.5.
     pub motion: f64,
     /// A step is shortened until errors grow by less than half of [`Settings::divergence`], even if the Jacobian is wrong by this many
-    /// standard deviations. Default 3.
+    /// standard deviations. Default 2.75.
     pub confidence: f64,
     /// Cost of the fourth power of a motion's length, as a share of the slopes' squares: long motions along directions that hardly
-    /// show are avoided. Default 0.02.
+    /// show are avoided. Default 0.001.
     pub restraint: f64,
 }
 
@@ -136,6 +136,6 @@ impl Exploration {
 
 impl Default for Trust {
     fn default() -> Self {
-        Trust { motion: 0.5, confidence: 3.0, restraint: 0.02 }
+        Trust { motion: 0.5, confidence: 2.75, restraint: 0.001 }
     }
 }
