@@ -4,8 +4,8 @@ use super::sections::{WORST, sample_cells, sample_header};
 use super::{arm, noise, residuals, sections, values, verdict};
 use crate::Error;
 use crate::calibrate::{
-    Calibration, Combination, DeterminedBy, Finding, SuggestOptions, SuggestedSample, Suggestion, TargetReport,
-    camera_deviations, combinations_in_words, length_in_words, suggest,
+    Calibration, Combination, DeterminedBy, Finding, Influence, SuggestOptions, SuggestedSample, Suggestion,
+    TargetReport, camera_deviations, combinations_in_words, length_in_words, most_influential, suggest,
 };
 use crate::recording::Recording;
 use crate::rig::Rig;
@@ -168,20 +168,25 @@ fn combination(weak: &Combination, metric: bool) -> Folded {
 /// The samples on which the result hangs.
 fn influence(page: &mut Page, subject: &Subject<'_>) {
     let report = &subject.calibration.report;
-    let mut most: Vec<_> = report.influence.iter().filter_map(|one| Some((one.sample, one.tip?, one.rms_px))).collect();
+    let most = most_influential(&report.influence, WORST);
     if most.is_empty() {
         return;
     }
-    most.sort_by(|a, b| b.1.total_cmp(&a.1));
-    most.truncate(WORST);
     page.section("influence", "The samples that matter most");
     page.paragraph("How far the tip would move without each of them.");
-    let row = |(sample, tip, rms): &(usize, f64, f64)| {
-        let cells = [length_in_words(*tip, report.metric), format!("{rms:.3}")];
-        sample_cells(subject.recording, *sample).into_iter().chain(cells).collect()
+    let has_points = report.points.observations > 0;
+    let row = |one: &Influence| {
+        let tip = match one.tip {
+            Some(tip) if tip.is_finite() => length_in_words(tip, report.metric),
+            _ => "without bound".to_owned(),
+        };
+        let mm = has_points.then(|| format!("{:.3}", 1e3 * one.rms_points_m));
+        let cells = [tip, format!("{:.3}", one.rms_px)].into_iter().chain(mm);
+        sample_cells(subject.recording, one.sample).into_iter().chain(cells).collect()
     };
     let rows: Vec<Vec<String>> = most.iter().map(row).collect();
-    let header = [&sample_header(subject.recording)[..], &["tip moves by", "its rms px"]].concat();
+    let figures = ["tip moves by", "its rms px"].into_iter().chain(has_points.then_some("its rms mm"));
+    let header: Vec<&str> = sample_header(subject.recording).into_iter().chain(figures).collect();
     page.table(&header, rows.iter().map(Vec::as_slice));
 }
 

@@ -25,7 +25,8 @@ pub(super) fn how_it_was_read(page: &mut Page, about: &About<'_>, recording: &Re
 
 /// A sample's index, and its time where samples have times.
 pub(super) fn sample_cells(recording: &Recording, sample: usize) -> Vec<String> {
-    let time = recording.samples[sample].time.map_or_else(|| "-".to_owned(), |time| format!("{time:.3}"));
+    let time = recording.samples.get(sample).and_then(|sample| sample.time);
+    let time = time.map_or_else(|| "-".to_owned(), |time| format!("{time:.3}"));
     [sample.to_string()].into_iter().chain(has_times(recording).then_some(time)).collect()
 }
 

@@ -3,7 +3,7 @@
 use crate::cli::Folder;
 use crate::learning::{learn, record};
 use crate::report_answers::{section, shown};
-use handeye::calibrate::{Combination, evaluate};
+use handeye::calibrate::{Combination, Influence, evaluate};
 use handeye::recording::Recording;
 use handeye::report::{About, Subject, evaluation_html, evaluation_steps, html, residuals};
 use handeye::rig::{Model, Rig, catalog};
@@ -106,6 +106,27 @@ fn samples_are_named_with_their_times_on_pages_and_in_the_terminal() {
     let (said, _) = folder.expect(0, "evaluate learned.toml motions.jsonl --report page.html");
     let page = folder.read("page.html");
     assert!(said.contains("sample 11 (1.") && !page.contains("time s") && rows(section(&page, "worst"))[0].len() == 4);
+}
+
+#[test]
+fn without_a_sample_that_nothing_replaces_the_tip_is_without_bound() {
+    let truth = catalog::rig("ur5").unwrap();
+    let recording = record(&truth, 20, 3);
+    let mut calibration = learn(&truth, &recording).unwrap();
+    let one =
+        |sample: usize, tip: f64| Influence { sample, tip: Some(tip), rms_px: 0.4, rms_points_m: 0.0, misfit: 1.0 };
+    calibration.report.influence = vec![one(4, 1e-4), one(9, f64::INFINITY)];
+    let subject = Subject {
+        about: "open".into(),
+        before: &truth,
+        calibration: &calibration,
+        recording: &recording,
+        suggestion: None,
+        tables: &[],
+    };
+    let page = html(&subject).unwrap();
+    let rows = rows(section(&page, "influence"));
+    assert_eq!([rows[0][0], rows[0][2], rows[1][0], rows[1][2]], ["9", "without bound", "4", "0.100 mm"]);
 }
 
 #[test]
