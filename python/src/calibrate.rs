@@ -1,11 +1,14 @@
 //! `calibrate` and what it gives.
-use crate::errors::raise;
+use crate::errors::{raise, unusable};
 use crate::evaluate::by_camera;
 use crate::recording::Recording;
 use crate::rig::{AnyRig, Rig};
 use crate::work;
-use handeye::calibrate::{self as library, DeterminedBy, NoiseTrial, Options, Report, length_in_words};
-use handeye::report::{Subject, html, suggestion};
+use handeye::calibrate::{
+    self as library, DeterminedBy, NoiseTrial, Options, Report, TargetReport as Targets, camera_deviations,
+    length_in_words,
+};
+use handeye::report::{About, Subject, html, suggestion};
 use handeye::rig;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -53,20 +56,25 @@ pub fn calibrate(
             rig::Ends::new([&one, &other]).map_err(|problem| PyValueError::new_err(format!("lengths: {problem}")))?;
         before.estimate.measure(rig::Length { between, length, sd: rig::Length::RULER });
     }
+    for (other, is_given) in [("relearn", relearn.is_some()), ("estimate_noise", estimate_noise)] {
+        if select_noise && is_given {
+            return Err(unusable(format!("select_noise: it picks what noise to learn with, and not with {other}")));
+        }
+    }
     let options = Options { seed, estimate_noise, influence };
-    let recording = recording.inner.clone();
-    let inner = work::run(py, progress.as_ref(), threads, |observer| {
-        let mut start = before.clone();
+    let (recording, notes) = (recording.inner.clone(), recording.notes.clone());
+    let (before, inner) = work::run(py, progress.as_ref(), threads, |observer| {
         if select_noise {
-            let trials = library::select_noise(&start, &recording, &options, observer)?;
-            start.noise = NoiseTrial::best(&trials).map_or(start.noise, |best| best.noise);
+            let trials = library::select_noise(&before, &recording, &options, observer)?;
+            before.noise = NoiseTrial::best(&trials).map_or(before.noise, |best| best.noise);
         }
-        match &relearn {
-            Some(paths) => library::relearn(&start, &recording, paths, &options, observer),
-            None => library::calibrate(&start, &recording, &options, observer),
-        }
+        let learned = match &relearn {
+            Some(paths) => library::relearn(&before, &recording, paths, &options, observer),
+            None => library::calibrate(&before, &recording, &options, observer),
+        };
+        Ok((before, learned?))
     })?;
-    Ok(Calibration { inner, before, text, recording })
+    Ok(Calibration { inner, before, text, recording, notes })
 }
 
 /// A learned rig and how it was learned.
@@ -76,6 +84,7 @@ pub struct Calibration {
     before: rig::Rig,
     text: Option<String>,
     recording: Arc<handeye::recording::Recording>,
+    notes: Vec<String>,
 }
 
 impl Calibration {
@@ -186,6 +195,7 @@ impl Calibration {
     fn weak(&self) -> Vec<Weak> {
         let weak = |weak: &library::Combination| Weak {
             numbers: weak.numbers.clone(),
+            moves: weak.moves.clone(),
             determined_by: match weak.determined_by {
                 DeterminedBy::Nothing => "nothing",
                 DeterminedBy::Prior(_) => "prior",
@@ -234,7 +244,7 @@ impl Calibration {
         let page = || {
             let suggestion = suggestion(&self.inner.rig, &self.recording, &self.before);
             html(&Subject {
-                title: title.unwrap_or("A learned rig"),
+                about: About { title: title.unwrap_or("A learned rig"), command: "", notes: &self.notes },
                 before: &self.before,
                 calibration: &self.inner,
                 recording: &self.recording,
@@ -265,9 +275,11 @@ impl Calibration {
         if let Some(tip) = &report.tip {
             lines.push(format!("the tip's position is known to {tip}"));
         }
+        lines.extend(camera_deviations(&self.inner));
         for (title, list) in [
             ("left open by the data", &report.gauge),
             ("the robot's state", &report.states),
+            ("of targets", &report.targets.as_ref().map_or_else(Vec::new, Targets::remarks)),
             ("does not fit", &self.findings()),
         ] {
             lines.extend(list.iter().map(|line| format!("{title}: {line}")));
@@ -326,6 +338,8 @@ impl TipDeviation {
 pub struct Weak {
     /// Parameter paths and how far each moves, in its own unit; the largest first and 1.
     numbers: Vec<(String, f64)>,
+    /// What moves together, in words: the largest parts, and how many smaller ones there are.
+    moves: String,
     /// ``"nothing"``, ``"prior"`` (more than the data) or ``"data, poorly"``.
     determined_by: &'static str,
     /// Standard deviation of the tip's position that comes of it [m, or the model's unit]; ``None`` where nothing bounds it.

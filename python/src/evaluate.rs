@@ -3,8 +3,8 @@ use crate::arrays::{NewArray, array};
 use crate::errors::raise;
 use crate::recording::Recording;
 use crate::rig::AnyRig;
-use handeye::calibrate::{self as library, CameraErrors};
-use handeye::report;
+use handeye::calibrate::{self as library, CameraErrors, Finding};
+use handeye::report::{self, About};
 use handeye::rig::replace_file;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -86,6 +86,7 @@ pub struct Evaluation {
     inner: library::Evaluation,
     rig: handeye::rig::Rig,
     recording: Arc<handeye::recording::Recording>,
+    notes: Vec<String>,
 }
 
 #[pymethods]
@@ -126,6 +127,19 @@ impl Evaluation {
         self.inner.total.median_px
     }
 
+    /// Median, and what 95 % do not exceed, of the pixel distances as lengths at the depth of each feature [m]; ``None`` where the rig's lengths
+    /// are no metres.
+    #[getter]
+    fn in_space(&self) -> Option<(f64, f64)> {
+        self.inner.space.map(|space| (space.median_m, space.p95_m))
+    }
+
+    /// True where the rig was learned from this recording, as far as its file tells: the figures then say how well it was fitted.
+    #[getter]
+    fn learned_from_it(&self) -> bool {
+        self.inner.is_own
+    }
+
     /// Over all cameras.
     #[getter]
     fn total(&self) -> Errors {
@@ -145,6 +159,18 @@ impl Evaluation {
         array(py, &[medians.len()], medians)
     }
 
+    /// What does not fit, in words.
+    #[getter]
+    fn findings(&self) -> Vec<String> {
+        self.inner.fitting.findings.iter().map(Finding::of_evaluation).collect()
+    }
+
+    /// What a reader may do, in sentences; judged without what does not fit.
+    #[getter]
+    fn steps(&self) -> Vec<String> {
+        report::evaluation_steps(&self.rig, &self.inner)
+    }
+
     /// One self-contained HTML page about it, which is written to a file. ``title`` stands at its top.
     #[pyo3(signature = (path, title = None))]
     fn report(&self, py: Python<'_>, path: PathBuf, title: Option<&str>) -> PyResult<()> {
@@ -155,13 +181,29 @@ impl Evaluation {
     /// The same page as text.
     #[pyo3(signature = (title = None))]
     fn html(&self, py: Python<'_>, title: Option<&str>) -> PyResult<String> {
-        let title = title.unwrap_or("A rig on a recording");
-        py.detach(|| report::evaluation_html(title, &self.rig, &self.recording, &self.inner)).map_err(raise)
+        let about = About { title: title.unwrap_or("A rig on a recording"), command: "", notes: &self.notes };
+        py.detach(|| report::evaluation_html(&about, &self.rig, &self.recording, &self.inner)).map_err(raise)
     }
 
     fn __repr__(&self) -> String {
-        let (samples, rms) = (self.inner.samples, self.inner.total.rms_px);
-        format!("<handeye.Evaluation {samples} samples, {} detections, {rms:.3} px rms>", self.inner.total.observations)
+        let library::Evaluation { samples, total, .. } = &self.inner;
+        let points = &total.points;
+        let px = (total.observations > points.observations).then(|| format!(", {:.3} px rms", total.rms_px));
+        let mm = (points.observations > 0).then(|| format!(", points {:.3} mm rms", 1e3 * points.rms_m));
+        let figures: String = px.into_iter().chain(mm).collect();
+        format!("<handeye.Evaluation {samples} samples, {} detections{figures}>", total.observations)
+    }
+
+    /// What a person wants to know first.
+    fn __str__(&self) -> String {
+        let mut lines = vec![self.__repr__().trim_matches(['<', '>']).trim_start_matches("handeye.").to_owned()];
+        lines.extend(self.inner.space.map(|space| {
+            let [median, most] = [space.median_m, space.p95_m].map(|length| 1e3 * length);
+            format!("in space: {median:.3} mm in the median, 95 % no more than {most:.3} mm")
+        }));
+        lines.extend(self.findings().iter().map(|line| format!("does not fit: {line}")));
+        lines.extend(self.steps());
+        lines.join("\n")
     }
 }
 
@@ -170,9 +212,9 @@ impl Evaluation {
 /// Raises ``UnusableInput`` where the rig is not complete or has another number of joints, ``NotDone`` where there is nothing to compare.
 #[pyfunction]
 pub fn evaluate(py: Python<'_>, rig: AnyRig<'_>, recording: &Recording) -> PyResult<Evaluation> {
-    let (rig, recording) = (&rig.inner, &recording.inner);
+    let (rig, notes, recording) = (&rig.inner, recording.notes.clone(), &recording.inner);
     let inner = py.detach(|| library::evaluate(rig, recording)).map_err(raise)?;
-    Ok(Evaluation { inner, rig: rig.clone(), recording: recording.clone() })
+    Ok(Evaluation { inner, rig: rig.clone(), recording: recording.clone(), notes })
 }
 
 /// Predicted minus seen of every pixel [px]: camera -> (samples, features, 2), NaN where nothing was seen or the rig knows no camera or

@@ -22,7 +22,7 @@ use std::sync::Arc;
 #[derive(Clone)]
 pub struct Recording {
     pub inner: Arc<recording::Recording>,
-    notes: Vec<String>,
+    pub notes: Vec<String>,
 }
 
 impl PartialEq for Recording {

@@ -47,10 +47,10 @@ fn length(honest: &Honest<'_>, [ahead, behind]: &[Model; 2], sd: Option<f64>) ->
     }
     let (change, what) = best?;
     if !lengths::tags(rig).is_empty() && rig.estimate.tag_side.is_none() {
-        return Some("give the side of the tags whose corners the features are (--tag-side METRES)".to_owned());
+        return Some("give the side of the tags whose corners the features are (`--tag-side METRES`)".to_owned());
     }
     Some(format!(
-        "measure {what} (--length, or [[estimate.lengths]] in the rig file): it is known to {:.1} mm along this",
+        "measure {what} (`--length`, or `[[estimate.lengths]]` in the rig file): it is known to {:.1} mm along this",
         1e3 * change
     ))
 }

@@ -3,8 +3,10 @@ use super::observation::Kind;
 use super::placed::Placed;
 use super::{Fitting, ReadingNoise};
 use crate::Error;
+use crate::export::note_on_unit;
 use crate::recording::{Recording, Sample};
-use crate::rig::{Camera, Model, Rig};
+use crate::rig::{Camera, Fit, Model, ModelCamera, Rig};
+use nalgebra::Vector3;
 
 /// Distances between what a rig predicts and what was seen. Those in px are of pixels, and 0 where there are none.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -40,6 +42,15 @@ pub struct PointErrors {
     pub max_m: f64,
 }
 
+/// Pixel distances as lengths in space, at the depth of each feature: distance × depth / focal length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpaceErrors {
+    /// Median [m].
+    pub median_m: f64,
+    /// What 95 % of them do not exceed [m].
+    pub p95_m: f64,
+}
+
 /// Errors of one camera.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CameraErrors {
@@ -61,6 +72,11 @@ pub struct Evaluation {
     pub rejected: usize,
     /// Over all cameras.
     pub total: Errors,
+    /// The pixel distances as lengths; `None` where those of the rig are no metres, or no feature is predicted in front of a camera.
+    pub space: Option<SpaceErrors>,
+    /// True where this is what the rig was learned from, as far as its `[fit]` tells: it has as many detections, and the readings of the joints
+    /// that `[fit]` names as least and largest.
+    pub is_own: bool,
     /// Per camera of the rig, in its order.
     pub cameras: Vec<CameraErrors>,
     /// Median pixel distance of every sample [px], where anything was compared in it.
@@ -76,10 +92,19 @@ pub struct Evaluation {
 /// Distances of single detections from where they are predicted.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Distances {
-    /// Of pixels [px], each with whether it is predicted behind the camera.
-    pub pixels: Vec<(f64, bool)>,
+    /// Of pixels.
+    pub pixels: Vec<PixelDistance>,
     /// Of points [m].
     pub points: Vec<f64>,
+}
+
+/// Distance of one pixel from where it is predicted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelDistance {
+    /// In the image [px].
+    pub px: f64,
+    /// In space, at the depth of the feature [m, or the rig's unit]; `None` where that is predicted behind the camera.
+    pub in_space: Option<f64>,
 }
 
 /// Predicts every detection of a recording from its joints, or from its tip's pose where it has none, and compares.
@@ -97,7 +122,7 @@ pub fn evaluate(rig: &Rig, recording: &Recording) -> Result<Evaluation, Error> {
         }
         evaluation.rejected += of_sample.rejected;
         evaluation.samples += usize::from(!all.is_empty());
-        let mut pixels: Vec<f64> = all.pixels.iter().map(|(distance, _)| *distance).collect();
+        let mut pixels = all.px();
         evaluation.sample_median_px.push((!pixels.is_empty()).then(|| median(&mut pixels)));
         evaluation.sample_median_m.push((!all.points.is_empty()).then(|| median(&mut all.points)));
     }
@@ -110,6 +135,8 @@ pub fn evaluate(rig: &Rig, recording: &Recording) -> Result<Evaluation, Error> {
         ));
     }
     evaluation.total = Errors::new(&total);
+    evaluation.space = SpaceErrors::new(rig, &total);
+    evaluation.is_own = rig.fit.as_ref().is_some_and(|fit| is_learned_from(fit, recording));
     let errors = |(camera, distances): (&Camera, &Distances)| CameraErrors {
         name: camera.name.clone(),
         errors: Errors::new(distances),
@@ -120,6 +147,19 @@ pub fn evaluate(rig: &Rig, recording: &Recording) -> Result<Evaluation, Error> {
     evaluation.fitting = Fitting::new(rig, &model, recording, &samples);
     evaluation.reading_noise = ReadingNoise::new(rig, &model, recording);
     Ok(evaluation)
+}
+
+/// Whether a rig was learned from a recording. Readings are compared exactly: two recordings hardly share all of their extremes.
+fn is_learned_from(fit: &Fit, recording: &Recording) -> bool {
+    let samples = &recording.samples;
+    let detections: usize = samples.iter().map(|sample| sample.pixels.len() + sample.points.len()).sum();
+    let is_read = |joint: usize, extreme: f64| {
+        samples.iter().filter_map(|sample| sample.joints.as_ref()?.get(joint)).any(|reading| *reading == extreme)
+    };
+    let mut extremes = fit.joints.iter().enumerate().flat_map(|(joint, range)| range.map(|extreme| (joint, extreme)));
+    !fit.joints.is_empty()
+        && detections == fit.observations + fit.rejected
+        && extremes.all(|(joint, extreme)| is_read(joint, extreme))
 }
 
 /// What of one sample could be compared.
@@ -158,11 +198,10 @@ pub(crate) fn of_sample(model: &Model, index: &Correspondence, sample: &Sample) 
         for seen in predictable {
             let of_camera = &mut cameras[seen.camera];
             let distance = seen.error(model, links).norm();
-            let is_in_front = |point| model.cameras[seen.camera].model.is_in_front(&point);
             match seen.kind() {
                 Kind::Pixels => {
-                    let behind = !is_in_front(model.in_camera(seen.camera, seen.feature, links));
-                    of_camera.pixels.push((distance, behind));
+                    let point = model.in_camera(seen.camera, seen.feature, links);
+                    of_camera.pixels.push(PixelDistance::new(distance, &model.cameras[seen.camera], &point));
                 }
                 Kind::Points => of_camera.points.push(distance),
             }
@@ -196,6 +235,11 @@ impl Distances {
         self.points.extend(&others.points);
     }
 
+    /// Those of pixels [px].
+    pub(crate) fn px(&self) -> Vec<f64> {
+        self.pixels.iter().map(|pixel| pixel.px).collect()
+    }
+
     /// True where there is neither a pixel nor a point.
     pub fn is_empty(&self) -> bool {
         self.pixels.is_empty() && self.points.is_empty()
@@ -205,7 +249,7 @@ impl Distances {
 impl Errors {
     /// Of single distances.
     pub fn new(distances: &Distances) -> Self {
-        let mut pixels: Vec<f64> = distances.pixels.iter().map(|(distance, _)| *distance).collect();
+        let mut pixels = distances.px();
         let [rms_px, mean_px, median_px, max_px] = summary(&mut pixels);
         let mut points = distances.points.clone();
         let [rms_m, mean_m, median_m, max_m] = summary(&mut points);
@@ -215,9 +259,29 @@ impl Errors {
             mean_px,
             median_px,
             max_px,
-            behind: distances.pixels.iter().filter(|(_, behind)| *behind).count(),
+            behind: distances.pixels.iter().filter(|pixel| pixel.in_space.is_none()).count(),
             points: PointErrors { observations: points.len(), rms_m, mean_m, median_m, max_m },
         }
+    }
+}
+
+impl PixelDistance {
+    /// Of a feature that is predicted at a point of the camera's frame [m].
+    pub(crate) fn new(px: f64, camera: &ModelCamera, point: &Vector3<f64>) -> Self {
+        PixelDistance { px, in_space: camera.length_per_pixel(point).map(|per_pixel| px * per_pixel) }
+    }
+}
+
+impl SpaceErrors {
+    /// `None` of nothing, and where the lengths of the rig are no metres.
+    pub(crate) fn new(rig: &Rig, distances: &Distances) -> Option<Self> {
+        if note_on_unit(rig).is_some() {
+            return None;
+        }
+        let mut lengths: Vec<f64> = distances.pixels.iter().filter_map(|pixel| pixel.in_space).collect();
+        let median_m = median(&mut lengths);
+        let most = (0.95 * lengths.len() as f64).ceil() as usize;
+        lengths.get(most.checked_sub(1)?).map(|&p95_m| SpaceErrors { median_m, p95_m })
     }
 }
 

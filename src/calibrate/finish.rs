@@ -1,6 +1,6 @@
 //! The learned rig and its account, from the final state.
 use super::deviations::Deviations;
-use super::evaluate::{Distances, Errors};
+use super::evaluate::{Distances, Errors, PixelDistance};
 use super::gauge;
 use super::graph::{State, row};
 use super::lengths;
@@ -46,8 +46,7 @@ pub(crate) fn finish(
         match seen.kind() {
             Kind::Pixels => {
                 let point = state.model.in_camera(seen.camera, seen.feature, &links[seen.sample]);
-                let behind = !state.model.cameras[seen.camera].model.is_in_front(&point);
-                of_camera.pixels.push((*distance, behind));
+                of_camera.pixels.push(PixelDistance::new(*distance, &state.model.cameras[seen.camera], &point));
             }
             Kind::Points => of_camera.points.push(*distance),
         }

@@ -2,7 +2,7 @@
 use super::evaluate::{SampleDistances, median, of_sample};
 use super::observation::Kind;
 use super::outliers::{IN_IMAGE, Image, Wrong, fits_swapped, images_of, is_wrong, swapped_with, wrong, yardstick};
-use super::{CameraErrors, Correspondence, Distance, Distances, Errors, Finding};
+use super::{CameraErrors, Correspondence, Distance, Distances, Errors, Finding, SpaceErrors};
 use crate::recording::{Recording, Sample};
 use crate::rig::{Model, Noise, Rig};
 use std::collections::BTreeMap;
@@ -18,6 +18,8 @@ const POOR: f64 = 3.0;
 pub struct Fitting {
     /// Over all cameras.
     pub total: Errors,
+    /// The pixel distances as lengths, as in [`Evaluation::space`](super::Evaluation).
+    pub space: Option<SpaceErrors>,
     /// Per camera of the rig, in its order, with how many of its detections do not fit.
     pub cameras: Vec<CameraErrors>,
     /// What does not fit.
@@ -50,7 +52,7 @@ impl Fitting {
                     single += usize::from(!out && alone);
                     !out && !alone
                 };
-                used.pixels.extend(seen.pixels.iter().filter(|(distance, _)| keep(Kind::Pixels, *distance)));
+                used.pixels.extend(seen.pixels.iter().filter(|pixel| keep(Kind::Pixels, pixel.px)));
                 used.points.extend(seen.points.iter().filter(|distance| keep(Kind::Points, **distance)));
                 *rejected += seen.pixels.len() + seen.points.len() - (used.pixels.len() + used.points.len() - before);
             }
@@ -64,6 +66,7 @@ impl Fitting {
         });
         let mut fitting = Fitting {
             total: Errors::new(&total),
+            space: SpaceErrors::new(rig, &total),
             cameras: cameras.collect(),
             findings: findings(model, rig, recording, &wrong, &medians, yardsticks),
             poor: poor(samples, &wrong, yardsticks),
@@ -102,7 +105,7 @@ fn is_out(wrong: &Wrong, image: Image) -> bool {
 /// Distances of one kind.
 fn of_kind(seen: &Distances, kind: Kind) -> Vec<f64> {
     match kind {
-        Kind::Pixels => seen.pixels.iter().map(|(distance, _)| *distance).collect(),
+        Kind::Pixels => seen.px(),
         Kind::Points => seen.points.clone(),
     }
 }

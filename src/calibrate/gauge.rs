@@ -109,7 +109,7 @@ impl Rules<'_> {
         self.freedom.parameters[longest] = true;
         let (joint, name) = (longest / LINK_PARAMETERS, NAMES[longest % LINK_PARAMETERS]);
         self.words.push(format!(
-            "lengths are in units of {name} of joint `{}`: nothing that is known is metric (one --length or a --tag-side would do)",
+            "lengths are in units of {name} of joint `{}`: nothing that is known is metric (one `--length` or a `--tag-side` would do)",
             joints[joint].name
         ));
     }

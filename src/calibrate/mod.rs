@@ -18,6 +18,7 @@ mod lengths;
 mod leverage;
 mod look;
 mod motion;
+mod moves;
 mod numbers;
 mod observation;
 mod outliers;
@@ -44,7 +45,10 @@ mod visual;
 mod weak;
 
 pub(crate) use cameras::with_headers;
-pub use evaluate::{CameraErrors, Distances, Errors, Evaluation, PointErrors, SampleDistances, distances, evaluate};
+pub use evaluate::{
+    CameraErrors, Distances, Errors, Evaluation, PixelDistance, PointErrors, SampleDistances, SpaceErrors, distances,
+    evaluate,
+};
 pub(crate) use evaluate::{Correspondence, median};
 pub use fitting::Fitting;
 pub use influence::{Influence, most_influential, worst_fitting};
@@ -61,6 +65,7 @@ pub use report::{
 pub use selection::{NoiseTrial, select_noise};
 pub use suggest::{SuggestOptions, SuggestedSample, Suggestion, suggest};
 pub use targets::{Disagreement, TargetReport};
+pub(crate) use weak::in_words as combinations_in_words;
 pub use weak::{Combination, DeterminedBy};
 
 use crate::Error;

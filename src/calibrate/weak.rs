@@ -3,13 +3,16 @@ use super::cures::cure;
 use super::deviations::{Honest, name};
 use super::direction::Direction;
 use super::graph::{Built, State};
-use handeye_solvers::{WeakDirection, Weakness};
+use super::moves;
+use handeye_solvers::{Component, WeakDirection, Weakness};
 
 /// Numbers of a rig that can move together without the data objecting much.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Combination {
     /// Parameter paths and how far each moves, in its own unit; the largest first and 1.
     pub numbers: Vec<(String, f64)>,
+    /// What moves together, in words: the largest parts, and how many smaller ones there are.
+    pub moves: String,
     /// What determines it.
     pub determined_by: DeterminedBy,
     /// Standard deviation of the tip's position that comes of it, root mean square over the recorded samples [m, or the
@@ -38,9 +41,8 @@ pub enum DeterminedBy {
     },
 }
 
-/// Combinations that are put in words, and how many numbers each names.
+/// Combinations that are put in words.
 const DIRECTIONS: usize = 6;
-const NAMED: usize = 4;
 
 /// Combinations of which a cure is looked for.
 const CURED: usize = 24;
@@ -70,8 +72,11 @@ impl Combination {
         let setup = &honest.setup;
         let samples: Vec<usize> = (0..setup.len()).collect();
         let rms = |all: Vec<f64>| (all.iter().map(|x| x * x).sum::<f64>() / all.len().max(1) as f64).sqrt();
+        let of_part = |part: &Component| (name(setup, built, part.node, part.coordinate), part.weight);
+        let numbers: Vec<(String, f64)> = direction.parts.iter().map(of_part).collect();
         Combination {
-            numbers: direction.parts.iter().map(|p| (name(setup, built, p.node, p.coordinate), p.weight)).collect(),
+            moves: moves::in_words(&setup.rig, &numbers),
+            numbers,
             determined_by,
             tip: direction.tip_motion(honest, state, built, &samples).map(rms),
             cure: if is_cured { cure(honest, state, built, direction) } else { String::new() },
@@ -91,15 +96,7 @@ impl std::fmt::Display for Combination {
             }
             DeterminedBy::Prior(ratio) => write!(f, "a prior more than the data ({ratio:.1} to 1) determines ")?,
         }
-        // Coordinates of one point have one name.
-        let mut names: Vec<&str> = self.numbers.iter().map(|(name, _)| name.as_str()).collect();
-        let mut seen = std::collections::BTreeSet::new();
-        names.retain(|name| seen.insert(*name));
-        let kind = if names.len() == 1 { "" } else { "a combination of " };
-        write!(f, "{kind}{}", names[..names.len().min(NAMED)].join(", "))?;
-        if names.len() > NAMED {
-            write!(f, " and {} more", names.len() - NAMED)?;
-        }
+        f.write_str(&self.moves)?;
         if !self.cure.is_empty() {
             write!(f, "; {}", self.cure)?;
         }

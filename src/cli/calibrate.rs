@@ -2,12 +2,12 @@
 use super::answer::Answer;
 use super::counts::learned_in_words;
 use super::folds::Folds;
-use super::inputs::{check_output, is_same, read_recordings_with_new, read_rig, write_output};
+use super::inputs::{check_output, files_read, is_same, read_and_remark, read_rig, write_output};
 use super::noise;
 use super::progress::Bar;
 use super::reading::Reading;
 use super::trust;
-use super::words::{cameras_json, count, duration, error_table, points_json};
+use super::words::{cameras_json, count, duration, error_table, file_name, file_names, points_json};
 use clap::Args;
 use handeye::Error;
 use handeye::calibrate::{
@@ -16,7 +16,7 @@ use handeye::calibrate::{
 };
 use handeye::recording::Recording;
 use handeye::report;
-use handeye::rig::{Ends, Length, Rig, files_named};
+use handeye::rig::{Ends, Length, Rig};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -102,11 +102,10 @@ fn metres(text: &str) -> Result<[f64; 2], String> {
 }
 
 impl Calibrate {
-    pub fn run(&self, is_json: bool) -> Result<Answer, Error> {
+    pub fn run(&self, is_json: bool, typed: &str) -> Result<Answer, Error> {
         let input = self.rig.as_deref().map(read_rig).transpose()?;
-        let recording = read_recordings_with_new(&self.recordings, input.as_ref(), &self.reading, &self.relearn)?;
-        let of_rig = self.rig.as_deref().map_or_else(Vec::new, files_named);
-        let mut inputs: Vec<PathBuf> = self.recordings.iter().cloned().chain(of_rig).collect();
+        let (recording, notes) = read_and_remark(&self.recordings, input.as_ref(), &self.reading, &self.relearn)?;
+        let mut inputs = files_read(&self.recordings, self.rig.as_deref(), &self.reading);
         check_output(&self.output, &inputs)?;
         if let Some(page) = &self.report {
             // Where the rig is learned into its own file, that is another output.
@@ -143,8 +142,10 @@ impl Calibrate {
         drop(bar);
         let output = self.output.display();
         let Calibration { rig: learned, report } = &calibration;
-        let mut answer = Answer::new(describe(&rig, &recording, &calibration, seconds), report_json(report));
+        let mut answer =
+            Answer::new(describe(&rig, &recording, &calibration, seconds), report_json(report, &recording));
         answer.json["seconds"] = json!(seconds);
+        answer.json["notes"] = json!(notes);
         if !trials.is_empty() {
             answer.text += &format!("\n{}", noise::trials_table(&trials));
             answer.json["noise_trials"] = noise::trials_json(&trials);
@@ -167,9 +168,10 @@ impl Calibrate {
             ));
         }
         if let Some(path) = &self.report {
+            let title = format!("{}, learned from {}", file_name(&self.output), file_names(&self.recordings));
             let tables = folds.iter().map(Folds::as_table).collect::<Vec<_>>();
             let subject = report::Subject {
-                title: &output.to_string(),
+                about: report::About { title: &title, command: typed, notes: &notes },
                 before: &rig,
                 calibration: &calibration,
                 recording: &recording,
@@ -226,27 +228,13 @@ fn describe(before: &Rig, recording: &Recording, calibration: &Calibration, seco
             lines.iter().for_each(|line| text += &format!("  {line}\n"));
         }
     }
-    text + &trust::text(report)
+    text + &trust::text(report, recording)
 }
 
 fn targets_in_words(targets: &TargetReport, rejected: usize) -> String {
     let (mm, deg) = (1e3 * targets.rms_xyz, targets.rms_rot.to_degrees());
     let mut text = format!("targets fit to {mm:.3} mm and {deg:.4}° rms per axis; {rejected} left out\n");
-    if let Some((offset, sd)) = targets.time_offset {
-        text += &format!("the images' clock is {:.2} ms ahead of the robot's (± {:.2} ms)\n", 1e3 * offset, 1e3 * sd);
-    }
-    if let Some((scale, sd)) = targets.scale {
-        text += &format!(
-            "the targets' translations are {scale:.4} times (± {sd:.4}) the robot's: they are monocular, or the target's size is wrong\n"
-        );
-    }
-    for one in &targets.disagreements {
-        let (deg, mm) = (one.rot.to_degrees(), 1e3 * one.xyz);
-        text += &format!("the closed form of {} disagrees: {deg:.1}° and {mm:.0} mm from what was learned\n", one.name);
-    }
-    if targets.pixels_unused {
-        text += "pixels were recorded too, without joints, and were not used\n";
-    }
+    targets.remarks().iter().for_each(|remark| text += &format!("{remark}\n"));
     text
 }
 
@@ -282,7 +270,7 @@ fn together(report: &Report) -> Errors {
 }
 
 /// How a rig was learned, as the one object of `--json`.
-pub fn report_json(report: &Report) -> Value {
+pub fn report_json(report: &Report, recording: &Recording) -> Value {
     let stage = |stage: &handeye::calibrate::StageReport| {
         json!({
             "name": stage.name,
@@ -316,7 +304,7 @@ pub fn report_json(report: &Report) -> Value {
         "tip_sd_largest_mm": metric.map(|tip| 1e3 * tip.largest),
         "tip_sd_by_data_mm": metric.map(|tip| 1e3 * tip.by_data),
         "weak": report.weak.iter().map(trust::weak_json).collect::<Vec<_>>(),
-        "influence": trust::influence_json(&report.influence),
+        "influence": trust::influence_json(&report.influence, recording),
     })
 }
 

@@ -82,7 +82,7 @@ impl Demo {
             "noise_px": rig.noise.pixels,
             "floor": { "rms_px": floor.rms_px, "mean_px": floor.mean_px, "median_px": floor.median_px },
             "seconds": seconds,
-            "calibration": report_json(&learned.report),
+            "calibration": report_json(&learned.report, &recording),
             "evaluation": evaluate::json(&judged),
             "rms_over_floor": ratio,
         });

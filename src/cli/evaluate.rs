@@ -1,13 +1,14 @@
 //! `handeye evaluate`: how well a rig predicts a recording.
 use super::answer::Answer;
 use super::calibrate::{finding_json, with};
-use super::inputs::{check_output, read_recordings, read_rig, write_output};
+use super::inputs::{check_output, files_read, read_and_remark, read_rig, write_output};
 use super::reading::Reading;
-use super::words::{cameras_json, count, error_table, errors_json, list, mm, px};
+use super::words::{cameras_json, count, error_table, errors_json, file_name, file_names, list, mm, px, seconds};
 use clap::Args;
 use handeye::Error;
-use handeye::calibrate::{Distance, Evaluation, ReadingNoise, evaluate};
-use handeye::report::{evaluation_html, evaluation_steps};
+use handeye::calibrate::{Distance, Evaluation, ReadingNoise, SpaceErrors, evaluate};
+use handeye::recording::Recording;
+use handeye::report::{About, evaluation_html, evaluation_steps};
 use handeye::rig::Rig;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -35,21 +36,23 @@ pub struct Evaluate {
 }
 
 impl Evaluate {
-    pub fn run(&self) -> Result<Answer, Error> {
+    pub fn run(&self, typed: &str) -> Result<Answer, Error> {
         let input = read_rig(&self.rig)?;
-        let recording = read_recordings(&self.recordings, Some(&input), &self.reading)?;
+        let (recording, notes) = read_and_remark(&self.recordings, Some(&input), &self.reading, &[])?;
         if let Some(page) = &self.report {
-            let inputs: Vec<PathBuf> = self.recordings.iter().chain([&self.rig]).cloned().collect();
-            check_output(page, &inputs)?;
+            let inputs = files_read(&self.recordings, Some(&self.rig), &self.reading);
+            check_output(page, &[inputs, vec![self.rig.clone()]].concat())?;
         }
         let evaluation = evaluate(&input.rig, &recording)?;
         if let Some(path) = &self.report {
-            let recordings: Vec<String> = self.recordings.iter().map(|path| path.display().to_string()).collect();
-            let title = format!("{} on {}", self.rig.display(), recordings.join(", "));
-            let page = evaluation_html(&title, &input.rig, &recording, &evaluation)?;
+            let title = format!("{} on {}", file_name(&self.rig), file_names(&self.recordings));
+            let about = About { title: &title, command: typed, notes: &notes };
+            let page = evaluation_html(&about, &input.rig, &recording, &evaluation)?;
             write_output(path, &page)?;
         }
-        Ok(Answer::new(text(&input.rig, &evaluation), json(&evaluation)))
+        let mut answer = Answer::new(text(&input.rig, &recording, &evaluation), json(&evaluation));
+        answer.json["notes"] = json!(notes);
+        Ok(answer)
     }
 }
 
@@ -64,11 +67,14 @@ pub fn json(evaluation: &Evaluation) -> Value {
         let medians = evaluation.sample_median_m.iter().map(|median| median.map(|m| 1e3 * m));
         object.insert("sample_median_mm".to_owned(), medians.collect());
     }
+    object.insert("in_space".to_owned(), space_json(evaluation.space));
+    object.insert("learned_from_it".to_owned(), json!(evaluation.is_own));
     let (of_readings, _) = &evaluation.reading_noise;
     object.insert("reading_noise".to_owned(), json!({ "rms_px": of_readings.px, "rms_mm": 1e3 * of_readings.m }));
     let poor = evaluation.fitting.poor.iter().map(|(sample, off)| with(json!({ "sample": sample }), "median", off));
     object.insert("fit_worst".to_owned(), poor.collect());
     let mut fitting = errors_json(&evaluation.fitting.total);
+    fitting.insert("in_space".to_owned(), space_json(evaluation.fitting.space));
     fitting.insert("cameras".to_owned(), cameras_json(&evaluation.fitting.cameras));
     object.insert("without_what_does_not_fit".to_owned(), Value::Object(fitting));
     let findings = evaluation.fitting.findings.iter();
@@ -76,10 +82,23 @@ pub fn json(evaluation: &Evaluation) -> Value {
     Value::Object(object)
 }
 
-fn text(rig: &Rig, evaluation: &Evaluation) -> String {
+fn space_json(space: Option<SpaceErrors>) -> Value {
+    let json = |SpaceErrors { median_m, p95_m }| json!({ "median_mm": 1e3 * median_m, "p95_mm": 1e3 * p95_m });
+    space.map_or(Value::Null, json)
+}
+
+fn space_in_words(space: SpaceErrors) -> String {
+    format!("{} mm in the median, and 95 % of them by no more than {} mm", mm(space.median_m), mm(space.p95_m))
+}
+
+fn text(rig: &Rig, recording: &Recording, evaluation: &Evaluation) -> String {
     let Evaluation { samples, rejected, total, cameras, fitting, .. } = evaluation;
     let mut text = format!("predicted {} of {}\n\n", count(total.observations, "detection"), count(*samples, "sample"));
     text += &error_table(cameras, total, *rejected).to_string();
+    if let Some(space) = evaluation.space {
+        let words = space_in_words(space);
+        text += &format!("\nin space, at the depth of the features, predictions are off by {words}\n");
+    }
     if *rejected > 0 {
         text += &format!(
             "\n{} left out: the rig does not know the camera or feature, or it does not follow from joints or a tip pose\n",
@@ -102,11 +121,17 @@ fn text(rig: &Rig, evaluation: &Evaluation) -> String {
         let left_out: usize = fitting.cameras.iter().map(|camera| camera.rejected).sum();
         text += "\nwithout what does not fit, as calibrate leaves it out:\n\n";
         text += &error_table(&fitting.cameras, &fitting.total, left_out).to_string();
+        if let Some(space) = fitting.space {
+            text += &format!("\nin space that is {}\n", space_in_words(space));
+        }
         text += "\nwhat does not fit:\n";
         fitting.findings.iter().for_each(|finding| text += &format!("  {}\n", finding.of_evaluation()));
     }
     if !fitting.poor.is_empty() {
-        let one = |(sample, off): &(usize, Distance)| format!("sample {sample} ({off:.1})");
+        let one = |(sample, off): &(usize, Distance)| match recording.samples[*sample].time {
+            Some(time) => format!("sample {sample} at {} s ({off:.1})", seconds(time)),
+            None => format!("sample {sample} ({off:.1})"),
+        };
         text += &format!(
             "\nfit worst, far beyond what is usual here in the median: {}\n",
             list(&fitting.poor.iter().map(one).collect::<Vec<_>>())

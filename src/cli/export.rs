@@ -5,7 +5,7 @@ use clap::{Args, ValueEnum};
 use handeye::Error;
 use handeye::export::{note_on_unit, to_camchain, to_intrinsics, to_static_transforms, to_tf, to_urdf};
 use handeye::intrinsics::{Intrinsics, to_camera_info, to_opencv};
-use handeye::rig::{Rig, read_text};
+use handeye::rig::{Rig, files_named, read_text};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -57,7 +57,8 @@ impl Export {
     pub fn run(&self) -> Result<Answer, Error> {
         let input = read_rig(&self.rig)?;
         if let Some(output) = &self.output {
-            let inputs: Vec<PathBuf> = [Some(&self.rig), self.urdf.as_ref()].into_iter().flatten().cloned().collect();
+            let given = [Some(&self.rig), self.urdf.as_ref()].into_iter().flatten().cloned();
+            let inputs: Vec<PathBuf> = given.chain(files_named(&self.rig)).collect();
             check_output(output, &inputs)?;
         }
         let text = self.text(&input)?;

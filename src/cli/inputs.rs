@@ -6,7 +6,7 @@ use crate::error::shipped;
 use crate::recording::is_in_another_order;
 use handeye::Error;
 use handeye::recording::{Format, OpenOptions, Opened, RecordedCamera, Recording, Sample};
-use handeye::rig::{Rig, catalog, matches, replace_file};
+use handeye::rig::{Rig, catalog, files_named, matches, replace_file};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -69,22 +69,24 @@ pub fn unknown(argument: &Path, what: &str, known: &[(&str, &str)]) -> Error {
 
 /// Reads recordings as one, and refuses what the rig cannot be the rig of.
 pub fn read_recordings(paths: &[PathBuf], rig: Option<&RigInput>, reading: &Reading) -> Result<Recording, Error> {
-    read_recordings_with_new(paths, rig, reading, &[])
+    Ok(read_and_remark(paths, rig, reading, &[])?.0)
 }
 
-/// The same where parameters that match any of `new` may be of cameras that the rig does not have yet.
-pub fn read_recordings_with_new(
+/// The same with what has to be said of how they were read, which is told on standard error.
+///
+/// Parameters that match any of `new` may be of cameras that the rig does not have yet.
+pub fn read_and_remark(
     paths: &[PathBuf],
     rig: Option<&RigInput>,
     reading: &Reading,
     new: &[String],
-) -> Result<Recording, Error> {
+) -> Result<(Recording, Vec<String>), Error> {
     let (recording, notes) = read_with_notes(paths, rig, reading, new)?;
     notes.iter().for_each(|note| remark(note));
-    Ok(recording)
+    Ok((recording, notes))
 }
 
-/// The same with what has to be said of how they were read.
+/// The same where nothing is told.
 pub fn read_with_notes(
     paths: &[PathBuf],
     rig: Option<&RigInput>,
@@ -161,6 +163,12 @@ pub fn is_same(one: &Path, other: &Path) -> bool {
         path.canonicalize().ok().or_else(|| Some(folder.canonicalize().ok()?.join(path.file_name()?)))
     };
     one == other || place(one).is_some_and(|one| Some(one) == place(other))
+}
+
+/// Every file that is read: recordings, those that a rig names, and the lenses of cameras.
+pub fn files_read(recordings: &[PathBuf], rig: Option<&Path>, reading: &Reading) -> Vec<PathBuf> {
+    let of_rig = rig.map_or_else(Vec::new, files_named);
+    recordings.iter().cloned().chain(of_rig).chain(reading.lens_files()).collect()
 }
 
 /// Fails where an output could not be written, or would replace one of the inputs: before the work, not after it.

@@ -33,6 +33,7 @@ use answer::{Answer, Refusal, print};
 use clap::Parser;
 use handeye::Error;
 use std::ffi::OsString;
+use words::as_typed;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -82,31 +83,31 @@ enum Command {
 /// Runs the command `handeye` with these arguments, of which the first is the program's name, prints what comes of it, and returns the exit
 /// status: 0 done; 1 the work could not be done; 2 unusable input or arguments.
 pub fn run(arguments: impl Iterator<Item = OsString>) -> u8 {
-    match parse(arguments) {
-        Ok(arguments) => print(arguments.run(), arguments.json),
+    let arguments: Vec<OsString> = arguments.collect();
+    match parse(&arguments) {
+        Ok(cli) => print(cli.run(&as_typed(&arguments)), cli.json),
         Err(refusal) => refusal.print(),
     }
 }
 
-fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Cli, Refusal> {
-    let arguments: Vec<OsString> = arguments.collect();
+fn parse(arguments: &[OsString]) -> Result<Cli, Refusal> {
     let is_json = arguments.iter().any(|argument| argument == "--json");
     Cli::try_parse_from(arguments).map_err(|error| Refusal { error, is_json })
 }
 
 impl Cli {
-    /// Does what was asked for.
-    fn run(&self) -> Result<Answer, Error> {
+    /// Does what was asked for; `typed` is the command itself, for pages.
+    fn run(&self, typed: &str) -> Result<Answer, Error> {
         match &self.command {
             Command::Demo(demo) => demo.run(self.json),
             Command::Check(check) => check.run(self.json),
             Command::Simulate(simulate) => simulate.run(),
-            Command::Calibrate(calibrate) => calibrate.run(self.json),
-            Command::Evaluate(evaluate) => evaluate.run(),
+            Command::Calibrate(calibrate) => calibrate.run(self.json, typed),
+            Command::Evaluate(evaluate) => evaluate.run(typed),
             Command::Infer(infer) => infer.run(),
             Command::Monitor(monitor) => monitor.run(),
             Command::Suggest(suggest) => suggest.run(),
-            Command::Servo(servo) => servo.run(self.json),
+            Command::Servo(servo) => servo.run(self.json, typed),
             Command::Task(task) => task.run(),
             Command::Experiment(experiment) => experiment.run(),
             Command::Convert(convert) => convert.run(),

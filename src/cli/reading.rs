@@ -3,7 +3,7 @@ use super::inputs::read_camera;
 use clap::{Args, ValueEnum};
 use handeye::Error;
 use handeye::recording::{Actions, Angles, BagOptions, Format, OpenOptions, TableOptions};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 #[derive(Args, Default)]
 pub struct Reading {
@@ -59,6 +59,11 @@ impl Reading {
             None => Ok(()),
             Some(option) => Err(Error::Unusable(format!("no recording is read, where {option} has no effect"))),
         }
+    }
+
+    /// Files that `--camera` names; sizes are taken for some that are not there.
+    pub fn lens_files(&self) -> impl Iterator<Item = PathBuf> + '_ {
+        self.of_files.camera.iter().filter_map(|text| Some(PathBuf::from(text.split_once('=')?.1)))
     }
 
     /// The first option of tables that is given.

@@ -3,10 +3,10 @@ use super::answer::Answer;
 use super::inputs::{check_output, is_same, read_rig, unknown, write_output};
 use super::progress::Line;
 use super::table::Table;
-use super::words::count;
+use super::words::{count, file_name};
 use clap::Args;
 use handeye::Error;
-use handeye::report::servo_html;
+use handeye::report::{About, servo_html};
 use handeye::rig::{Rig, files_named};
 use handeye::scene::{self, Moment, Run, Scene};
 use handeye::servo::{Command, Stop};
@@ -53,7 +53,7 @@ pub struct Servo {
 const ROWS: usize = 24;
 
 impl Servo {
-    pub fn run(&self, is_json: bool) -> Result<Answer, Error> {
+    pub fn run(&self, is_json: bool, typed: &str) -> Result<Answer, Error> {
         let input = self.rig.as_deref().map(read_rig).transpose()?;
         let mut scene = read_scene(&self.scene)?;
         let of_rig = self.rig.as_deref().map_or_else(Vec::new, files_named);
@@ -81,7 +81,10 @@ impl Servo {
         }
         let world = scene.rig.as_ref().or(known);
         if let (Some(path), Some(world)) = (&self.report, world) {
-            let page = servo_html(&title, world, known.is_some(), &run)?;
+            let with_rig = self.rig.as_deref().map(|rig| format!(", with the rig {}", file_name(rig)));
+            let titled = format!("{title}{}", with_rig.unwrap_or_default());
+            let about = About { title: &titled, command: typed, notes: &[] };
+            let page = servo_html(&about, world, known.is_some(), &run)?;
             write_output(path, &page)?;
         }
         let nothing = Rig::default();

@@ -4,6 +4,7 @@ use super::inputs::{check_output, read_rig};
 use super::words::count;
 use clap::Args;
 use handeye::Error;
+use handeye::rig::files_named;
 use handeye::simulate::{SimulateOptions, simulate};
 use serde_json::{Map, json};
 use std::path::PathBuf;
@@ -47,9 +48,10 @@ pub struct Simulate {
 impl Simulate {
     pub fn run(&self) -> Result<Answer, Error> {
         let input = read_rig(&self.rig)?;
-        check_output(&self.output, std::slice::from_ref(&self.rig))?;
+        let inputs = [vec![self.rig.clone()], files_named(&self.rig)].concat();
+        check_output(&self.output, &inputs)?;
         if let Some(truth) = &self.truth {
-            check_output(truth, std::slice::from_ref(&self.rig))?;
+            check_output(truth, &inputs)?;
             if *truth == self.output {
                 return Err(Error::Unusable(format!("{}: given for two outputs", truth.display())));
             }

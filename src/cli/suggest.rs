@@ -1,6 +1,6 @@
 //! `handeye suggest`: where to move next.
 use super::answer::Answer;
-use super::inputs::{check_output, read_recordings, read_rig};
+use super::inputs::{check_output, files_read, read_recordings, read_rig};
 use super::reading::Reading;
 use super::table::Table;
 use super::words::count;
@@ -9,7 +9,7 @@ use handeye::Error;
 use handeye::calibrate::{SuggestOptions, SuggestedSample, Suggestion, length_in_words, suggest};
 use handeye::chain::JointKind;
 use handeye::recording::{RecordedCamera, Recording, Sample};
-use handeye::rig::{Camera, Rig};
+use handeye::rig::{Camera, Rig, files_named};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -59,7 +59,9 @@ impl Suggest {
             Some(read_recordings(&self.with, Some(&input), &self.reading)?)
         };
         if let Some(output) = &self.output {
-            let inputs = self.with.iter().chain([&self.learned]).chain(&self.rig).cloned().collect::<Vec<_>>();
+            let of_rigs = [Some(&self.learned), self.rig.as_ref()].into_iter().flatten();
+            let mut inputs = files_read(&self.with, None, &self.reading);
+            of_rigs.for_each(|rig| inputs.extend([rig.clone()].into_iter().chain(files_named(rig))));
             check_output(output, &inputs)?;
         }
         let options = SuggestOptions { count: self.count, seed: self.seed };

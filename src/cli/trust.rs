@@ -1,19 +1,21 @@
 //! How much of a calibration to trust, for people and for programs.
 use super::table::Table;
-use super::words::{mm, px};
+use super::words::{mm, px, seconds};
 use handeye::calibrate::{
     Combination, DeterminedBy, Influence, Report, length_in_words, most_influential, worst_fitting,
 };
+use handeye::recording::Recording;
 use serde_json::{Value, json};
 
 /// Samples that are listed.
 const LISTED: usize = 10;
 
 /// The samples that matter most, where that was asked for.
-pub fn text(report: &Report) -> String {
+pub fn text(report: &Report, recording: &Recording) -> String {
     if report.influence.is_empty() {
         return String::new();
     }
+    let has_times = recording.samples.iter().any(|sample| sample.time.is_some());
     let has_points = report.points.observations > 0;
     let mut text = String::new();
     for (title, samples) in [
@@ -23,7 +25,8 @@ pub fn text(report: &Report) -> String {
         if samples.is_empty() {
             continue;
         }
-        let header = ["sample", "without it the tip moves", "rms px"].into_iter().chain(has_points.then_some("rms mm"));
+        let header = ["sample"].into_iter().chain(has_times.then_some("time s"));
+        let header = header.chain(["without it the tip moves", "rms px"]).chain(has_points.then_some("rms mm"));
         let mut table = Table::new(&header.collect::<Vec<_>>());
         for Influence { sample, tip, rms_px, rms_points_m, .. } in samples {
             let tip = match tip {
@@ -31,8 +34,9 @@ pub fn text(report: &Report) -> String {
                 Some(tip) => length_in_words(tip, report.metric),
                 None => "-".to_owned(),
             };
-            let row = [sample.to_string(), tip, px(rms_px)].into_iter();
-            table.row(row.chain(has_points.then(|| mm(rms_points_m))));
+            let time = recording.samples[sample].time.map_or_else(|| "-".to_owned(), seconds);
+            let row = [sample.to_string()].into_iter().chain(has_times.then_some(time));
+            table.row(row.chain([tip, px(rms_px)]).chain(has_points.then(|| mm(rms_points_m))));
         }
         text += &format!("\n{title} (numbered from 0):\n{table}");
     }
@@ -49,6 +53,7 @@ pub fn weak_json(weak: &Combination) -> Value {
     let numbers: Vec<Value> = weak.numbers.iter().map(|(path, by)| json!({ "path": path, "weight": by })).collect();
     json!({
         "numbers": numbers,
+        "moves": weak.moves,
         "determined_by": determined_by,
         "sd_data_over_prior": sd_ratio,
         "sd": sd,
@@ -59,14 +64,15 @@ pub fn weak_json(weak: &Combination) -> Value {
 }
 
 /// The most influential and the worst-fitting samples; null where that was not asked for.
-pub fn influence_json(all: &[Influence]) -> Value {
+pub fn influence_json(all: &[Influence], recording: &Recording) -> Value {
     if all.is_empty() {
         return Value::Null;
     }
     let list = |samples: Vec<Influence>| -> Vec<Value> {
         let one = |one: Influence| {
             let (px, mm) = (one.rms_px, 1e3 * one.rms_points_m);
-            json!({ "sample": one.sample, "tip": one.tip, "rms_px": px, "rms_points_mm": mm })
+            let time = recording.samples[one.sample].time;
+            json!({ "sample": one.sample, "time": time, "tip": one.tip, "rms_px": px, "rms_points_mm": mm })
         };
         samples.into_iter().map(one).collect()
     };

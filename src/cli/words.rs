@@ -2,6 +2,8 @@
 use super::table::Table;
 use handeye::calibrate::{CameraErrors, Errors, PointErrors};
 use serde_json::{Map, Value, json};
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
 
 /// "1 sample", "2 samples".
 pub fn count(n: usize, what: &str) -> String {
@@ -23,6 +25,32 @@ pub fn px(value: f64) -> String {
 /// Metres as millimetres, with as many digits as can matter.
 pub fn mm(value: f64) -> String {
     format!("{:.3}", 1e3 * value)
+}
+
+/// The command as it is typed in a shell, whatever path the program was called by.
+pub fn as_typed(arguments: &[OsString]) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "-_./=,:@%+".contains(c);
+    let quoted = |argument: &OsString| {
+        let text = argument.to_string_lossy();
+        let is_plain = !text.is_empty() && text.chars().all(is_plain);
+        if is_plain { text.into_owned() } else { format!("'{}'", text.replace('\'', "'\\''")) }
+    };
+    ["handeye".to_owned()].into_iter().chain(arguments.iter().skip(1).map(quoted)).collect::<Vec<_>>().join(" ")
+}
+
+/// Names of files without their folders, the first few of many.
+pub fn file_names(paths: &[PathBuf]) -> String {
+    list(&paths.iter().map(|path| file_name(path)).collect::<Vec<_>>())
+}
+
+/// The name of a file without its folder.
+pub fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// A moment of a recording [s].
+pub fn seconds(time: f64) -> String {
+    format!("{time:.3}")
 }
 
 /// A time as people tell it.
@@ -120,4 +148,15 @@ pub fn cameras_json(cameras: &[CameraErrors]) -> Value {
         (camera.name.clone(), Value::Object(errors))
     };
     Value::Object(cameras.iter().map(entry).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_is_told_as_a_shell_takes_it() {
+        let arguments = ["/opt/handeye", "evaluate", "my rig.toml", "it's.jsonl", "--join=0.5", ""].map(OsString::from);
+        assert_eq!(as_typed(&arguments), r"handeye evaluate 'my rig.toml' 'it'\''s.jsonl' --join=0.5 ''");
+    }
 }

@@ -1,11 +1,12 @@
 //! What the samples themselves show, without a model.
 use super::{About, Finding};
 use crate::chain::JointKind;
-use crate::recording::{Recording, is_in_another_order};
+use crate::recording::{Recording, Sample, is_in_another_order};
 use crate::rig::Rig;
 use handeye_solvers::Pose;
 use handeye_solvers::manifold::so3;
 use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeSet;
 
 /// Share of samples that may repeat an earlier one before it is worth saying.
 const REPEATED: f64 = 0.2;
@@ -67,13 +68,20 @@ fn outside_limits(rig: &Rig, recording: &Recording) -> Vec<Finding> {
     findings
 }
 
-fn repeats(recording: &Recording) -> Option<Finding> {
-    let samples = &recording.samples;
-    let states = |i: usize| (samples[i].joints.as_ref(), samples[i].pose.as_ref());
-    let read: Vec<usize> = (0..samples.len()).filter(|i| states(*i) != (None, None)).collect();
-    let n = read.len();
-    let repeats = (0..n).filter(|&k| read[..k].iter().any(|&earlier| states(earlier) == states(read[k]))).count();
-    (repeats as f64 > REPEATED * n as f64).then(|| Finding {
+/// Samples whose joints or poses were read before, to the last bit, where they are many.
+pub(crate) fn repeats(recording: &Recording) -> Option<Finding> {
+    let mut known = BTreeSet::new();
+    let (mut n, mut repeats) = (0_u32, 0_u32);
+    for Sample { joints, pose, .. } in &recording.samples {
+        if joints.is_none() && pose.is_none() {
+            continue;
+        }
+        let of_pose = pose.iter().flat_map(|pose| pose.rotation.iter().chain(&pose.translation));
+        let numbers = joints.iter().flatten().chain(of_pose).map(|number| number.to_bits());
+        n += 1;
+        repeats += u32::from(!known.insert((joints.is_some(), numbers.collect::<Vec<u64>>())));
+    }
+    (f64::from(repeats) > REPEATED * f64::from(n)).then(|| Finding {
         about: About::Order,
         what: format!("{repeats} of {n} samples repeat the robot's state of an earlier one"),
         change: "record more varied positions".into(),

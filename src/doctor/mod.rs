@@ -7,6 +7,8 @@ mod pixels;
 mod poses;
 mod undo;
 
+pub(crate) use data::repeats;
+
 use crate::calibrate;
 use crate::chain::JointKind;
 use crate::recording::Recording;

@@ -1,19 +1,19 @@
 //! The page of a calibration.
-use super::page::Page;
-use super::sections::WORST;
-use super::{arm, combinations, noise, residuals, sections, values, verdict};
+use super::page::{About, Folded, Page};
+use super::sections::{WORST, sample_cells, sample_header};
+use super::{arm, noise, residuals, sections, values, verdict};
 use crate::Error;
 use crate::calibrate::{
-    Calibration, DeterminedBy, Finding, SuggestOptions, SuggestedSample, Suggestion, camera_deviations,
-    length_in_words, suggest,
+    Calibration, Combination, DeterminedBy, Finding, Influence, SuggestOptions, SuggestedSample, Suggestion,
+    TargetReport, camera_deviations, combinations_in_words, length_in_words, most_influential, suggest,
 };
 use crate::recording::Recording;
 use crate::rig::Rig;
 
 /// What a report on a calibration is made of.
 pub struct Subject<'a> {
-    /// What stands at the top, such as the name of the file that was written.
-    pub title: &'a str,
+    /// What stands at the top, such as the names of the file that was written and of the recordings.
+    pub about: About<'a>,
     /// What was known before.
     pub before: &'a Rig,
     /// What was learned, and how.
@@ -39,6 +39,9 @@ pub struct ExtraTable {
 /// Positions to move to next that a page suggests.
 const SUGGESTED: usize = 3;
 
+/// Numbers of a combination that a page has at most: those of a thousand features would be megabytes.
+const NUMBERS: usize = 200;
+
 /// Where to move next, for [`Subject::suggestion`]; `None` where that cannot be said, as for an arm of which no range is known. `before`: the
 /// rig that learning started from.
 pub fn suggestion(learned: &Rig, recording: &Recording, before: &Rig) -> Option<Suggestion> {
@@ -53,12 +56,13 @@ pub fn html(subject: &Subject<'_>) -> Result<String, Error> {
     let Calibration { rig, report } = subject.calibration;
     // Where targets were learned from, pixels were not, and lenses may be unknown.
     let residuals = if report.targets.is_some() { Vec::new() } else { residuals(rig, subject.recording)? };
-    let mut page = Page::new(subject.title);
+    let mut page = Page::new(&subject.about);
     verdict::section(&mut page, subject, &residuals);
     summary(&mut page, subject);
+    sections::how_it_was_read(&mut page, &subject.about, subject.recording);
     sections::cameras(&mut page, rig, &report.cameras, &residuals);
     noise::section(&mut page, rig, &residuals, &report.findings);
-    sections::worst(&mut page, rig, &residuals, &report.findings);
+    sections::worst(&mut page, rig, subject.recording, &residuals, &report.findings);
     sections::coverage(&mut page, rig, subject.recording);
     arm::view(&mut page, rig, subject.recording, arm::Shown::Few)?;
     values::table(&mut page, subject);
@@ -105,6 +109,7 @@ fn summary(page: &mut Page, subject: &Subject<'_>) {
         page.paragraph("No minimum was reached: what stands below is not to be relied on.");
     }
     page.list(&report.states);
+    page.list(&report.targets.as_ref().map_or_else(Vec::new, TargetReport::remarks));
     page.list(&camera_deviations(subject.calibration));
     if report.findings.is_empty() {
         page.paragraph("Nothing in the recording stands out as wrong.");
@@ -122,39 +127,67 @@ fn open(page: &mut Page, subject: &Subject<'_>) {
         page.paragraph("Nothing: everything that was to be learned is determined by the recording.");
         return;
     }
-    page.list(&report.gauge);
-    let row = |combination: &crate::calibrate::Combination| {
-        let by = match combination.determined_by {
-            DeterminedBy::Nothing => "nothing".to_owned(),
-            DeterminedBy::Prior(ratio) if ratio.is_finite() => format!("its prior, {ratio:.0} times the data"),
-            DeterminedBy::Prior(_) => "its prior alone".to_owned(),
-            DeterminedBy::Poorly { .. } => "the data, poorly".to_owned(),
-        };
-        let tip = combination.tip.map_or("unbounded".to_owned(), |tip| length_in_words(tip, report.metric));
-        vec![combinations::together(&subject.calibration.rig, &combination.numbers), by, tip, combination.cure.clone()]
+    let of_weak = combinations_in_words(&report.weak);
+    let rules: Vec<String> = report.gauge.iter().filter(|line| !of_weak.contains(line)).cloned().collect();
+    page.list(&rules);
+    if report.weak.is_empty() {
+        return;
+    }
+    page.paragraph(
+        "What can move together without the recording objecting much; lengths at the tip are standard deviations.",
+    );
+    page.folded_list(&report.weak.iter().map(|weak| combination(weak, report.metric)).collect::<Vec<_>>());
+}
+
+/// What moves and what that means, with all its numbers to unfold.
+fn combination(weak: &Combination, metric: bool) -> Folded {
+    let by = match weak.determined_by {
+        DeterminedBy::Nothing => "nothing determines this".to_owned(),
+        DeterminedBy::Prior(ratio) if ratio.is_finite() => {
+            format!("its prior determines this {ratio:.0} times as well as the data")
+        }
+        DeterminedBy::Prior(_) => "its prior alone determines this".to_owned(),
+        DeterminedBy::Poorly { .. } => "the data determine this, and poorly".to_owned(),
     };
-    let rows: Vec<Vec<String>> = report.weak.iter().map(row).collect();
-    if !rows.is_empty() {
-        page.table(&["together", "determined by", "at the tip", "what would help"], rows.iter().map(Vec::as_slice));
+    let tip = match (weak.tip, weak.determined_by) {
+        (Some(tip), _) => format!(", {} at the tip", length_in_words(tip, metric)),
+        (None, DeterminedBy::Nothing) => ", without bound".to_owned(),
+        (None, _) => String::new(),
+    };
+    let cure = if weak.cure.is_empty() { String::new() } else { format!(" What would help: {}.", weak.cure) };
+    let moves = weak.moves.strip_prefix("the ").map_or_else(|| weak.moves.clone(), |rest| format!("The {rest}"));
+    let numbers = weak.numbers.iter().take(NUMBERS).map(|(path, by)| format!("{by:+.3} {path}"));
+    let more = weak.numbers.len().checked_sub(NUMBERS + 1).map(|more| format!("and {} more", more + 1));
+    Folded {
+        words: format!("{moves}: {by}{tip}.{cure}"),
+        summary: format!("its {} numbers, and how far each moves", weak.numbers.len()),
+        more: numbers.chain(more).collect::<Vec<_>>().join(", "),
     }
 }
 
 /// The samples on which the result hangs.
 fn influence(page: &mut Page, subject: &Subject<'_>) {
     let report = &subject.calibration.report;
-    let mut most: Vec<_> = report.influence.iter().filter_map(|one| Some((one.sample, one.tip?, one.rms_px))).collect();
+    let most = most_influential(&report.influence, WORST);
     if most.is_empty() {
         return;
     }
-    most.sort_by(|a, b| b.1.total_cmp(&a.1));
-    most.truncate(WORST);
     page.section("influence", "The samples that matter most");
     page.paragraph("How far the tip would move without each of them.");
-    let row = |(sample, tip, rms): &(usize, f64, f64)| {
-        vec![sample.to_string(), length_in_words(*tip, report.metric), format!("{rms:.3}")]
+    let has_points = report.points.observations > 0;
+    let row = |one: &Influence| {
+        let tip = match one.tip {
+            Some(tip) if tip.is_finite() => length_in_words(tip, report.metric),
+            _ => "without bound".to_owned(),
+        };
+        let mm = has_points.then(|| format!("{:.3}", 1e3 * one.rms_points_m));
+        let cells = [tip, format!("{:.3}", one.rms_px)].into_iter().chain(mm);
+        sample_cells(subject.recording, one.sample).into_iter().chain(cells).collect()
     };
     let rows: Vec<Vec<String>> = most.iter().map(row).collect();
-    page.table(&["sample (from 0)", "tip moves by", "its rms px"], rows.iter().map(Vec::as_slice));
+    let figures = ["tip moves by", "its rms px"].into_iter().chain(has_points.then_some("its rms mm"));
+    let header: Vec<&str> = sample_header(subject.recording).into_iter().chain(figures).collect();
+    page.table(&header, rows.iter().map(Vec::as_slice));
 }
 
 /// Joint positions to record next, and what they would buy.

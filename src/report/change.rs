@@ -35,12 +35,12 @@ pub(super) fn words(when: &str, seeing: &[&str]) -> String {
     if let [camera] = seeing {
         return format!(
             "{when} nothing is seen where the rest of the samples has it: camera `{camera}`, the base or the features were moved, or the joints \
-             count from elsewhere. handeye calibrate --relearn cameras.{camera} learns the camera anew from the samples of its new place \
+             count from elsewhere. `handeye calibrate --relearn cameras.{camera}` learns the camera anew from the samples of its new place \
              (robot.base or features where those were moved)."
         );
     }
     format!(
-        "{when} no camera sees anything where the rest of the samples has it: the base, a joint or the features were moved. handeye monitor \
-         tells which, and handeye calibrate --relearn learns that part anew from the samples of its new place."
+        "{when} no camera sees anything where the rest of the samples has it: the base, a joint or the features were moved. `handeye monitor` \
+         tells which, and `handeye calibrate --relearn` learns that part anew from the samples of its new place."
     )
 }

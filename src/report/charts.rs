@@ -8,38 +8,51 @@ use std::fmt::Write;
 /// Points that a drawing shows at most: more is a blot, and a heavy page.
 const POINTS: usize = 3000;
 
-/// Residuals around nothing, as far as `reach` [px] to each side; those beyond it lie on the edge.
+/// Arrows that a map has at most: more cover the dots, and each other.
+const ARROWS: usize = 250;
+
+/// Residuals around nothing, as far as four standard deviations `sd` [px] to each side; those beyond lie on the edge. Circles at one, two and
+/// three are drawn over them, so that the densest cloud hides none.
 pub(super) fn scatter(residuals: &[&Residual], sd: f64) -> String {
     let reach = 4.0 * sd;
     let place = |error: f64| 150.0 + 130.0 * (error / reach).clamp(-1.0, 1.0);
-    let mut svg = open(300.0, 300.0);
-    for radius in [1.0, 2.0, 3.0] {
-        let r = 130.0 * radius / 4.0;
-        let _ = write!(svg, "<circle class=\"axis\" cx=\"150\" cy=\"150\" r=\"{r:.1}\"/>");
-    }
-    svg += "<path class=\"axis\" d=\"M20 150H280M150 20V280\"/>";
+    let mut svg = open(300.0, 310.0);
     for residual in residuals.iter().step_by(residuals.len().div_ceil(POINTS).max(1)) {
         let [x, y] = residual.error.map(place);
         let class = if residual.distance() > reach { "bad" } else { "mark" };
         let _ = write!(svg, "<circle class=\"{class}\" fill-opacity=\"0.5\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"1.8\"/>");
     }
-    let _ = write!(svg, "<text x=\"284\" y=\"146\" text-anchor=\"end\">{reach:.2} px</text></svg>");
+    svg += "<path class=\"axis\" d=\"M20 150H280M150 20V280\"/>";
+    for radius in [1.0, 2.0, 3.0] {
+        let r = 130.0 * radius / 4.0;
+        let _ = write!(svg, "<circle class=\"ring\" cx=\"150\" cy=\"150\" r=\"{r:.1}\"/>");
+    }
+    // Below everything that can be drawn.
+    let _ = write!(svg, "<text x=\"280\" y=\"304\" text-anchor=\"end\">to ±{reach:.2} px</text></svg>");
     svg
 }
 
-/// Residuals where they were seen, `scale` times as long as they are.
+/// Every how many of so many residuals a map has an arrow for.
+pub(super) fn arrows_of(count: usize) -> usize {
+    count.div_ceil(ARROWS).max(1)
+}
+
+/// Where features were seen, and over a few of them ([`arrows_of`]) their residuals, `scale` times as long as they are; dots lie over arrows.
 pub(super) fn map(residuals: &[&Residual], [width, height]: [f64; 2], scale: f64) -> String {
     let mut svg = image(width, height);
-    let (dot, line) = (width / 320.0, width / 500.0);
-    for residual in residuals.iter().step_by(residuals.len().div_ceil(POINTS).max(1)) {
+    let (dot, line) = (width / 240.0, width / 500.0);
+    for residual in residuals.iter().step_by(arrows_of(residuals.len())) {
         let [u, v] = residual.seen;
         let end = [u + scale * residual.error[0], v + scale * residual.error[1]];
         let _ = write!(
             svg,
-            "<circle class=\"mark\" cx=\"{u:.1}\" cy=\"{v:.1}\" r=\"{dot:.1}\"/>\
-             <path class=\"arrow\" stroke-width=\"{line:.1}\" d=\"M{u:.1} {v:.1}L{:.1} {:.1}\"/>",
+            "<path class=\"arrow\" stroke-width=\"{line:.1}\" d=\"M{u:.1} {v:.1}L{:.1} {:.1}\"/>",
             end[0], end[1]
         );
+    }
+    for residual in residuals.iter().step_by(residuals.len().div_ceil(POINTS).max(1)) {
+        let [u, v] = residual.seen;
+        let _ = write!(svg, "<circle class=\"mark\" cx=\"{u:.1}\" cy=\"{v:.1}\" r=\"{dot:.1}\"/>");
     }
     svg + "</svg>"
 }

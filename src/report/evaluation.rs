@@ -1,9 +1,9 @@
 //! The page of an evaluation.
-use super::page::Page;
+use super::page::{About, Page};
 use super::residuals::of_predictions;
 use super::{arm, change, noise, sections};
 use crate::Error;
-use crate::calibrate::{CameraErrors, Evaluation, Finding, ReadingNoise};
+use crate::calibrate::{CameraErrors, Evaluation, Finding, ReadingNoise, SpaceErrors};
 use crate::recording::Recording;
 use crate::rig::Rig;
 
@@ -14,21 +14,26 @@ const WORSE: f64 = 1.5;
 /// file does not tell.
 const TOGETHER: f64 = 1.1;
 
-/// The page of how well a rig predicts a recording. `title` stands at the top.
+/// Said where a rig is judged on what it was learned from.
+const OWN: &str = "The rig was learned from this recording: the figures say how well it was fitted, and not how well it predicts. Judge it on samples that it \
+     has not seen.";
+
+/// The page of how well a rig predicts a recording.
 ///
 /// Errors: [`Error::Unusable`] where rig and recording do not fit.
 pub fn evaluation_html(
-    title: &str,
+    about: &About<'_>,
     rig: &Rig,
     recording: &Recording,
     evaluation: &Evaluation,
 ) -> Result<String, Error> {
     let residuals = of_predictions(rig, recording)?;
-    let mut page = Page::new(title);
+    let mut page = Page::new(about);
     summary(&mut page, rig, evaluation);
+    sections::how_it_was_read(&mut page, about, recording);
     sections::cameras(&mut page, rig, &evaluation.cameras, &residuals);
     noise::section(&mut page, rig, &residuals, &evaluation.fitting.findings);
-    sections::worst(&mut page, rig, &residuals, &evaluation.fitting.findings);
+    sections::worst(&mut page, rig, recording, &residuals, &evaluation.fitting.findings);
     sections::coverage(&mut page, rig, recording);
     arm::view(&mut page, rig, recording, arm::Shown::Few)?;
     page.section("next", "What to do next");
@@ -38,7 +43,7 @@ pub fn evaluation_html(
 
 /// How well it predicts, beside how well it was fitted.
 fn summary(page: &mut Page, rig: &Rig, evaluation: &Evaluation) {
-    let Evaluation { samples, rejected, total, fitting, reading_noise: (of_readings, _), .. } = evaluation;
+    let Evaluation { samples, rejected, total, space, fitting, reading_noise: (of_readings, _), .. } = evaluation;
     page.section("summary", "How well it predicts");
     let mut figures = Vec::new();
     if total.observations > total.points.observations {
@@ -47,6 +52,13 @@ fn summary(page: &mut Page, rig: &Rig, evaluation: &Evaluation) {
             figures.push((format!("{:.3} px", fitting.total.rms_px), "the same without what does not fit"));
         }
         figures.push((format!("{:.3} px", total.median_px), "median pixel distance"));
+        if let Some(SpaceErrors { median_m, p95_m }) = space {
+            figures.push((format!("{:.3} mm", 1e3 * median_m), "the same in space, at the depth of the features"));
+            figures.push((format!("{:.3} mm", 1e3 * p95_m), "what 95 % of them do not exceed in space"));
+        }
+        if let Some(SpaceErrors { p95_m, .. }) = fitting.space.filter(|_| !fitting.findings.is_empty()) {
+            figures.push((format!("{:.3} mm", 1e3 * p95_m), "the same 95 % without what does not fit"));
+        }
         if of_readings.px > 0.0 {
             figures.push((
                 format!("{:.3} px", of_readings.px),
@@ -74,6 +86,9 @@ fn summary(page: &mut Page, rig: &Rig, evaluation: &Evaluation) {
         (rejected.to_string(), "detections left out"),
     ]);
     page.figures(&figures);
+    if evaluation.is_own {
+        page.paragraph(OWN);
+    }
     if *rejected > 0 {
         page.paragraph("Left out is what the rig does not know the feature or camera of, and what does not follow from joints or a tip pose.");
     }
@@ -117,18 +132,20 @@ pub fn evaluation_steps(rig: &Rig, evaluation: &Evaluation) -> Vec<String> {
     let judged: Vec<usize> =
         medians.filter(|(_, (px, m))| px.is_some() || m.is_some()).map(|(sample, _)| sample).collect();
     let changed = change::when(&judged, &fitting.findings);
-    let mut steps: Vec<String> = changed.iter().map(|when| change::words(when, &seeing)).collect();
+    let own = evaluation.is_own.then(|| OWN.to_owned());
+    let changes = changed.iter().map(|when| change::words(when, &seeing));
+    let mut steps: Vec<String> = own.into_iter().chain(changes).collect();
     if !off.is_empty() && off.len() == seeing.len() && seeing.len() > 1 {
         steps.push(
-            "Every camera is further off than when the rig was learned: handeye monitor tells whether the base, a joint or the features \
-             moved, and handeye check whether the recording is in order."
+            "Every camera is further off than when the rig was learned: `handeye monitor` tells whether the base, a joint or the features \
+             moved, and `handeye check` whether the recording is in order."
                 .to_owned(),
         );
     } else {
         let words = |camera: &CameraErrors| {
             format!(
-                "Camera {0} is further off than when the rig was learned: if it was moved, learn it anew with handeye calibrate --relearn \
-                 cameras.{0}.",
+                "Camera `{0}` is further off than when the rig was learned: if it was moved, learn it anew with `handeye calibrate --relearn \
+                 cameras.{0}`.",
                 camera.name
             )
         };

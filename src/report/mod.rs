@@ -3,7 +3,6 @@ mod arm;
 mod calibration;
 mod change;
 mod charts;
-mod combinations;
 mod evaluation;
 mod noise;
 mod page;
@@ -15,5 +14,6 @@ mod verdict;
 
 pub use calibration::{ExtraTable, Subject, html, suggestion};
 pub use evaluation::{evaluation_html, evaluation_steps};
+pub use page::About;
 pub use residuals::{Residual, residuals};
 pub use servo::servo_html;

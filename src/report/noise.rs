@@ -3,7 +3,7 @@ use super::charts::histogram;
 use super::page::Page;
 use super::residuals::Residual;
 use super::sections::scales;
-use crate::calibrate::{Finding, Kind, is_wrong, yardstick};
+use crate::calibrate::{Distance, Finding, Kind, is_wrong, yardstick};
 use crate::rig::Rig;
 use std::collections::BTreeMap;
 
@@ -95,13 +95,32 @@ fn is_named(rig: &Rig, residual: &Residual, findings: &[Finding]) -> bool {
     let camera_name = &rig.cameras[residual.camera].name;
     let is_meant = |finding: &Finding| match finding {
         Finding::WrongJoints { sample, .. } | Finding::UnknownState { sample } => *sample == residual.sample,
-        Finding::WrongImage { sample, camera, .. } => *sample == residual.sample && camera == camera_name,
+        Finding::WrongImage { sample, camera, off: Distance::Pixels(_) } => {
+            *sample == residual.sample && camera == camera_name
+        }
         Finding::CameraMoved { camera, .. } => camera == camera_name,
-        Finding::Outliers { .. }
+        // What is wrong are the image's points.
+        Finding::WrongImage { off: Distance::Metres(_), .. }
+        | Finding::Outliers { .. }
         | Finding::UnseenCamera { .. }
         | Finding::Misfit { .. }
         | Finding::MissedLength { .. }
         | Finding::FarFromGiven { .. } => false,
     };
     findings.iter().any(is_meant)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rig::catalog;
+
+    #[test]
+    fn an_image_whose_points_are_wrong_keeps_its_pixels() {
+        let rig = catalog::rig("ur5").unwrap();
+        let residual = Residual { sample: 3, camera: 0, feature: 0, seen: [0.0; 2], error: [0.1; 2] };
+        let wrong = |off: Distance| Finding::WrongImage { sample: 3, camera: rig.cameras[0].name.clone(), off };
+        assert!(is_named(&rig, &residual, &[wrong(Distance::Pixels(40.0))]));
+        assert!(!is_named(&rig, &residual, &[wrong(Distance::Metres(0.04))]));
+    }
 }

@@ -6,20 +6,41 @@ const STYLE: &str = include_str!("style.css");
 const SCRIPT: &str = include_str!("view.js");
 const PLAYER: &str = include_str!("player.js");
 
-/// A page that is being written.
+/// What a page is about.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct About<'a> {
+    /// What stands at its top, such as the names of a rig and of its recordings.
+    pub title: &'a str,
+    /// The command that made it; empty where none did.
+    pub command: &'a str,
+    /// What there is to say of how the recording was read.
+    pub notes: &'a [String],
+}
+
+impl<'a> From<&'a str> for About<'a> {
+    fn from(title: &'a str) -> Self {
+        About { title, ..About::default() }
+    }
+}
+
+/// A page that is being written. Of words, what stands between backticks is shown as code.
 pub(super) struct Page {
     body: String,
     is_open: bool,
 }
 
 impl Page {
-    pub fn new(title: &str) -> Self {
-        let title = escaped(title);
+    pub fn new(about: &About<'_>) -> Self {
+        let title = escaped(about.title);
+        let command = match about.command {
+            "" => String::new(),
+            command => format!("<p class=\"command\"><code>{}</code></p>\n", escaped(command)),
+        };
         let head = format!(
             "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
              <meta name=\"color-scheme\" content=\"light dark\">\n<title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n\
-             <body>\n<main>\n<h1>{title}</h1>\n"
+             <body>\n<main>\n<h1>{title}</h1>\n{command}"
         );
         Page { body: head, is_open: false }
     }
@@ -27,7 +48,7 @@ impl Page {
     /// Begins a section.
     pub fn section(&mut self, id: &str, title: &str) {
         self.close();
-        let _ = writeln!(self.body, "<section id=\"{id}\">\n<h2>{}</h2>", escaped(title));
+        let _ = writeln!(self.body, "<section id=\"{id}\">\n<h2>{}</h2>", coded(title));
         self.is_open = true;
     }
 
@@ -39,7 +60,7 @@ impl Page {
 
     /// A paragraph of words.
     pub fn paragraph(&mut self, words: &str) {
-        let _ = writeln!(self.body, "<p>{}</p>", escaped(words));
+        let _ = writeln!(self.body, "<p>{}</p>", coded(words));
     }
 
     /// A list of words; nothing where there are none.
@@ -49,7 +70,20 @@ impl Page {
         }
         self.body += "<ul>\n";
         for item in items {
-            let _ = writeln!(self.body, "<li>{}</li>", escaped(item));
+            let _ = writeln!(self.body, "<li>{}</li>", coded(item));
+        }
+        self.body += "</ul>\n";
+    }
+
+    /// A list of words, each with more that a reader may unfold and what that is called; nothing where there are none.
+    pub fn folded_list(&mut self, items: &[Folded]) {
+        if items.is_empty() {
+            return;
+        }
+        self.body += "<ul>\n";
+        for Folded { words, summary, more } in items {
+            let (words, summary, more) = (coded(words), coded(summary), coded(more));
+            let _ = writeln!(self.body, "<li>{words}<details><summary>{summary}</summary><p>{more}</p></details></li>");
         }
         self.body += "</ul>\n";
     }
@@ -58,7 +92,7 @@ impl Page {
     pub fn figures(&mut self, figures: &[(String, &str)]) {
         self.body += "<dl class=\"figures\">\n";
         for (figure, what) in figures {
-            let _ = writeln!(self.body, "<div><dt>{}</dt><dd>{}</dd></div>", escaped(what), escaped(figure));
+            let _ = writeln!(self.body, "<div><dt>{}</dt><dd>{}</dd></div>", coded(what), coded(figure));
         }
         self.body += "</dl>\n";
     }
@@ -67,13 +101,13 @@ impl Page {
     pub fn table<'a>(&mut self, header: &[&str], rows: impl IntoIterator<Item = &'a [String]>) {
         self.body += "<div class=\"wide\"><table>\n<thead><tr>";
         for cell in header {
-            let _ = write!(self.body, "<th>{}</th>", escaped(cell));
+            let _ = write!(self.body, "<th>{}</th>", coded(cell));
         }
         self.body += "</tr></thead>\n<tbody>\n";
         for row in rows {
             self.body += "<tr>";
             for cell in row {
-                let _ = write!(self.body, "<td>{}</td>", escaped(cell));
+                let _ = write!(self.body, "<td>{}</td>", coded(cell));
             }
             self.body += "</tr>\n";
         }
@@ -82,7 +116,7 @@ impl Page {
 
     /// A drawing with what it shows.
     pub fn drawing(&mut self, svg: &str, caption: &str) {
-        let _ = writeln!(self.body, "<figure>{svg}<figcaption>{}</figcaption></figure>", escaped(caption));
+        let _ = writeln!(self.body, "<figure>{svg}<figcaption>{}</figcaption></figure>", coded(caption));
     }
 
     /// Drawings side by side where there is room.
@@ -129,5 +163,40 @@ impl Page {
     pub fn finish(mut self) -> String {
         self.close();
         self.body + "</main>\n</body>\n</html>\n"
+    }
+}
+
+/// Words of which more is folded away.
+pub(super) struct Folded {
+    /// What is always shown.
+    pub words: String,
+    /// What the rest is called.
+    pub summary: String,
+    /// The rest.
+    pub more: String,
+}
+
+/// Words as HTML: what stands between two backticks is code.
+fn coded(words: &str) -> String {
+    let mut html = String::new();
+    let mut rest = words;
+    while let Some((before, from)) = rest.split_once('`')
+        && let Some((code, after)) = from.split_once('`')
+    {
+        let _ = write!(html, "{}<code>{}</code>", escaped(before), escaped(code));
+        rest = after;
+    }
+    html + &escaped(rest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stands_between_backticks_is_code_and_text_all_the_same() {
+        assert_eq!(coded("camera `a<b` and `c`: d"), "camera <code>a&lt;b</code> and <code>c</code>: d");
+        assert_eq!(coded("one ` alone, `two` and <"), "one <code> alone, </code>two` and &lt;");
+        assert_eq!(coded("none"), "none");
     }
 }

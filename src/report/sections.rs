@@ -1,16 +1,43 @@
 //! Sections that several pages share: how well a rig predicts a recording.
-use super::charts::{Strip, map, scatter, strips};
+use super::charts::{Strip, arrows_of, map, scatter, strips};
 use super::noise::in_use;
-use super::page::Page;
+use super::page::{About, Page};
 use super::residuals::Residual;
 use crate::calibrate::{CameraErrors, Finding, median};
 use crate::chain::JointKind;
+use crate::doctor;
 use crate::recording::Recording;
 use crate::rig::Rig;
 
 /// Worst samples that are listed, and whose images are drawn.
 pub(super) const WORST: usize = 10;
 const DRAWN: usize = 4;
+
+/// What there is to say of how a recording was read, and of samples that repeat; nothing where there is nothing.
+pub(super) fn how_it_was_read(page: &mut Page, about: &About<'_>, recording: &Recording) {
+    let repeats = doctor::repeats(recording).map(|doctor::Finding { what, change, .. }| format!("{what}: {change}"));
+    let lines: Vec<String> = about.notes.iter().cloned().chain(repeats).collect();
+    if !lines.is_empty() {
+        page.section("reading", "How the recording was read");
+        page.list(&lines);
+    }
+}
+
+/// A sample's index, and its time where samples have times.
+pub(super) fn sample_cells(recording: &Recording, sample: usize) -> Vec<String> {
+    let time = recording.samples.get(sample).and_then(|sample| sample.time);
+    let time = time.map_or_else(|| "-".to_owned(), |time| format!("{time:.3}"));
+    [sample.to_string()].into_iter().chain(has_times(recording).then_some(time)).collect()
+}
+
+/// What stands above them.
+pub(super) fn sample_header(recording: &Recording) -> Vec<&'static str> {
+    ["sample (from 0)"].into_iter().chain(has_times(recording).then_some("time s")).collect()
+}
+
+fn has_times(recording: &Recording) -> bool {
+    recording.samples.iter().any(|sample| sample.time.is_some())
+}
 
 /// Scatter and map of every camera's residuals.
 pub(super) fn cameras(page: &mut Page, rig: &Rig, cameras: &[CameraErrors], residuals: &[Residual]) {
@@ -40,14 +67,18 @@ pub(super) fn cameras(page: &mut Page, rig: &Rig, cameras: &[CameraErrors], resi
         page.begin_row();
         page.drawing(
             &scatter(&own, sd),
-            &format!("{}: residuals, with circles at 1, 2 and 3 standard deviations", camera.name),
+            &format!("{}: residuals [px], with circles at 1, 2 and 3 standard deviations", camera.name),
         );
         let exaggeration = 0.04 * size[0] / sd;
         let exaggeration = if exaggeration >= 1.0 { exaggeration.round() } else { 1.0 };
         let clear: Vec<&Residual> = own.iter().copied().filter(|residual| residual.distance() < 12.0 * sd).collect();
+        let shown = match arrows_of(clear.len()) {
+            1 => "the residuals".to_owned(),
+            every => format!("one residual in {every}"),
+        };
         page.drawing(
             &map(&clear, size, exaggeration),
-            &format!("{}: where the image was covered, and residuals {exaggeration} times as long", camera.name),
+            &format!("{}: where the image was covered, and {shown}, {exaggeration} times as long", camera.name),
         );
         page.end_row();
     }
@@ -69,7 +100,7 @@ fn extent(residuals: &[&Residual]) -> [f64; 2] {
 }
 
 /// The samples that are worst as a whole, with their images: a single wrong detection does not make one.
-pub(super) fn worst(page: &mut Page, rig: &Rig, residuals: &[Residual], findings: &[Finding]) {
+pub(super) fn worst(page: &mut Page, rig: &Rig, recording: &Recording, residuals: &[Residual], findings: &[Finding]) {
     let used = in_use(rig, residuals, findings);
     let mut samples: Vec<(&[&Residual], f64)> = Vec::new();
     for of_sample in used.chunk_by(|a, b| a.sample == b.sample) {
@@ -87,10 +118,12 @@ pub(super) fn worst(page: &mut Page, rig: &Rig, residuals: &[Residual], findings
     let sds = scales(rig, residuals);
     let row = |(of_sample, median_px): &(&[&Residual], f64)| {
         let n_far = of_sample.iter().filter(|residual| residual.distance() > 6.0 * sds[residual.camera]).count();
-        vec![of_sample[0].sample.to_string(), format!("{median_px:.3}"), of_sample.len().to_string(), n_far.to_string()]
+        let cells = [format!("{median_px:.3}"), of_sample.len().to_string(), n_far.to_string()];
+        sample_cells(recording, of_sample[0].sample).into_iter().chain(cells).collect()
     };
     let rows: Vec<Vec<String>> = samples.iter().map(row).collect();
-    let header = ["sample (from 0)", "median px", "detections", "beyond six standard deviations"];
+    let figures = ["median px", "detections", "beyond six standard deviations"];
+    let header = [&sample_header(recording)[..], &figures].concat();
     page.table(&header, rows.iter().map(Vec::as_slice));
     page.begin_row();
     for (of_sample, median_px) in samples.iter().take(DRAWN) {

@@ -1,7 +1,7 @@
 //! The page of a servo run.
 use super::arm::{Shown, thinned, view};
 use super::charts::{Curve, curve, ways};
-use super::page::Page;
+use super::page::{About, Page};
 use crate::Error;
 use crate::chain::JointKind;
 use crate::recording::{Recording, Sample};
@@ -16,11 +16,11 @@ use std::collections::BTreeMap;
 const ROWS: usize = 24;
 
 /// The page of a run in simulation, with the loop as an animation. `rig`: that of the world, by which the arm is drawn; `has_rig`: whether the
-/// controller knew one; `title` stands at the top.
+/// controller knew one.
 ///
 /// Errors: [`Error::Unusable`] where the rig is not complete.
-pub fn servo_html(title: &str, rig: &Rig, has_rig: bool, run: &Run) -> Result<String, Error> {
-    let mut page = Page::new(title);
+pub fn servo_html(about: &About<'_>, rig: &Rig, has_rig: bool, run: &Run) -> Result<String, Error> {
+    let mut page = Page::new(about);
     summary(&mut page, rig, run);
     let stride = thinned(run.moments.len());
     images(&mut page, run, stride);
@@ -177,7 +177,7 @@ fn next(page: &mut Page, run: &Run, has_rig: bool) {
     let words = match &run.stop {
         Stop::Converged { .. } => "It arrived: nothing needs to be done.".to_owned(),
         Stop::NoBetter { .. } => {
-            let who = if has_rig { "the rig is off (handeye evaluate tells by how much), or " } else { "" };
+            let who = if has_rig { "the rig is off (`handeye evaluate` tells by how much), or " } else { "" };
             format!(
                 "Where the error left is of the size by which it varies, only less noise brings it nearer. Where it is much larger, what is \
                  aimed at cannot be reached exactly: {who}a tracker or the target is off."
@@ -185,7 +185,7 @@ fn next(page: &mut Page, run: &Run, has_rig: bool) {
         }
         Stop::Blocked { .. } => "Loosen the limits that are named, or begin or end elsewhere.".to_owned(),
         Stop::Diverged { .. } if has_rig => {
-            "The controller is wrong about how the pixels move: handeye evaluate and handeye monitor tell whether the rig still describes \
+            "The controller is wrong about how the pixels move: `handeye evaluate` and `handeye monitor` tell whether the rig still describes \
              this robot; a smaller gain helps where it is only roughly right."
                 .to_owned()
         }

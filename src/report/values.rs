@@ -18,13 +18,15 @@ pub(super) fn table(page: &mut Page, subject: &Subject<'_>) {
         let is_of = |finding: &Finding| matches!(finding, Finding::CameraMoved { camera, .. } if path.starts_with(&format!("cameras.{camera}.")));
         subject.calibration.report.findings.iter().any(is_of)
     };
+    let given: BTreeMap<String, Parameter> =
+        before.parameters().into_iter().map(|parameter| (parameter.path(before), parameter)).collect();
     let mut rows = Vec::new();
     for parameter in after.parameters() {
         let path = parameter.path(after);
         let Some(learned) = numbers(after, &parameter) else { continue };
-        let given = before.parameters().into_iter().find(|known| known.path(before) == path);
-        let known = given.as_ref().and_then(|known| numbers(before, known));
-        let priors = given.and_then(|known| prior_sds(before, &known)).unwrap_or_default();
+        let given = given.get(&path);
+        let known = given.and_then(|known| numbers(before, known));
+        let priors = given.and_then(|known| prior_sds(before, known)).unwrap_or_default();
         let deviations = sd.and_then(|sd| sd.get(&path));
         let state = match deviations {
             Some(sd) => {
@@ -64,7 +66,8 @@ fn joined(values: &[f64], digits: impl Fn(f64) -> String) -> String {
 
 /// As many decimals as matter: tenths of a millimetre and of a milliradian, hundredths of a pixel.
 fn fixed(value: f64) -> String {
-    if value.abs() >= 50.0 { format!("{value:.2}") } else { format!("{value:.4}") }
+    let digits = if value.abs() >= 50.0 { format!("{value:.2}") } else { format!("{value:.4}") };
+    if digits == "-0.0000" { "0.0000".to_owned() } else { digits }
 }
 
 /// Two digits that count.

@@ -52,14 +52,14 @@ fn fit(subject: &Subject<'_>) -> String {
 fn among(findings: &[Finding]) -> String {
     let count = |is: fn(&Finding) -> bool| findings.iter().filter(|finding| is(finding)).count();
     let kinds = [
-        (count(|finding| matches!(finding, Finding::WrongJoints { .. } | Finding::UnknownState { .. })), "sample"),
-        (count(|finding| matches!(finding, Finding::WrongImage { .. })), "image"),
-        (count(|finding| matches!(finding, Finding::CameraMoved { .. })), "camera that moved"),
+        (
+            count(|finding| matches!(finding, Finding::WrongJoints { .. } | Finding::UnknownState { .. })),
+            ["sample", "samples"],
+        ),
+        (count(|finding| matches!(finding, Finding::WrongImage { .. })), ["image", "images"]),
+        (count(|finding| matches!(finding, Finding::CameraMoved { .. })), ["camera that moved", "cameras that moved"]),
     ];
-    let words = |(n, what): (usize, &str)| {
-        let plural = what.strip_suffix(" that moved").map_or(format!("{what}s"), |what| format!("{what}s that moved"));
-        (n > 0).then(|| format!("{n} whole {}", if n == 1 { what.to_owned() } else { plural }))
-    };
+    let words = |(n, names): (usize, [&str; 2])| (n > 0).then(|| format!("{n} whole {}", names[usize::from(n > 1)]));
     let words: Vec<String> = kinds.into_iter().filter_map(words).collect();
     if words.is_empty() { String::new() } else { format!(", among them {}", words.join(" and ")) }
 }
@@ -99,7 +99,7 @@ pub(super) fn steps(subject: &Subject<'_>) -> Vec<String> {
     steps.extend(changed.iter().map(|when| change::words(when, &seeing)));
     let moved = |finding: &Finding| match finding {
         Finding::CameraMoved { camera, .. } => Some(format!(
-            "Camera `{camera}` moved: the rig has it where it was for most of the recording. handeye calibrate --relearn cameras.{camera} learns \
+            "Camera `{camera}` moved: the rig has it where it was for most of the recording. `handeye calibrate --relearn cameras.{camera}` learns \
              it anew from the samples of where it is now."
         )),
         _ => None,
@@ -137,7 +137,7 @@ pub(super) fn steps(subject: &Subject<'_>) -> Vec<String> {
         "Learn from a second recording too: the poses of both agree within a few of their standard deviations."
             .to_owned()
     } else {
-        "Judge the rig on samples that it has not seen: handeye evaluate.".to_owned()
+        "Judge the rig on samples that it has not seen: `handeye evaluate`.".to_owned()
     });
     steps
 }

@@ -61,6 +61,14 @@ impl ModelCamera {
         (ray.dot(point) >= SAME_DIRECTION * point.norm()).then_some([u, v])
     }
 
+    /// How far sideways a point of its frame [m] is moved by a pixel: depth / √(fx fy), or through a fisheye, whose pixels are angles,
+    /// distance / √(fx fy) [m/px]. `None` where it is not in front.
+    pub fn length_per_pixel(&self, point: &Vector3<f64>) -> Option<f64> {
+        let away = if self.model == CameraModel::KannalaBrandt { point.norm() } else { point.z };
+        let [fx, fy, ..] = self.intrinsics;
+        self.model.is_in_front(point).then(|| away / (fx * fy).abs().sqrt())
+    }
+
     /// True where it has a lens, so that it gives pixels; false for a depth camera that gives points alone.
     pub fn has_lens(&self) -> bool {
         self.intrinsics[0] != 0.0

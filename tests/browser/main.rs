@@ -49,6 +49,8 @@ addEventListener('load', () => {
       a.x < b.x + b.width && b.x < a.x + a.width && Math.abs(a.y - b.y) < a.height - 1)),
     labels: canvas && canvas.labels.map((label) => label.name).sort(),
     ratio: Math.round(1e3 * devicePixelRatio) / 1e3,
+    ticks: document.body.innerText.includes('`'),
+    folds: [...document.querySelectorAll('details')].every((one) => !one.open && one.querySelector('p').getBoundingClientRect().height === 0),
     ink: getComputedStyle(document.body).color,
   });
 });
@@ -145,6 +147,8 @@ impl Pages {
             );
             assert_eq!((&answer["drawings"], &answer["empty"]), (&drawings.into(), &0.into()), "{answer}");
             assert_eq!((&answer["labels"], &answer["ratio"]), (&cameras.into(), &RATIO.into()), "{answer}");
+            // Names are code, and what is folded away takes no room.
+            assert_eq!((&answer["ticks"], &answer["folds"]), (&false.into(), &true.into()), "{answer}");
             // As wide as the page but for its margins, filled, with a pixel for every one of the screen, and names that can be read.
             let view = &answer["view"];
             assert!(view["filled"].as_f64().unwrap() > 0.75 && view["width"].as_f64().unwrap() > 0.85, "{answer}");

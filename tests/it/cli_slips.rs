@@ -157,3 +157,34 @@ fn options_of_reading_are_refused_where_nothing_is_read() {
         }
     }
 }
+
+/// Whatever a command reads, it writes over none of it: files that the rig names and the lenses of `--camera` among it.
+#[test]
+fn no_file_that_is_read_is_written_over() {
+    let folder = Folder::new("slips-written-over");
+    let lens = "image_width: 640\nimage_height: 480\ndistortion_model: plumb_bob\n\
+                camera_matrix: { rows: 3, cols: 3, data: [600, 0, 319.5, 0, 600, 239.5, 0, 0, 1] }\n\
+                distortion_coefficients: { rows: 1, cols: 5, data: [0, 0, 0, 0, 0] }\n";
+    folder.write("left.yaml", lens).write("right.yaml", lens);
+    let mut rig = handeye::rig::catalog::rig("ur5").unwrap();
+    let left = &mut rig.cameras[0];
+    (left.size, left.model, left.distortion) = (None, None, None);
+    (left.fx, left.fy, left.cx, left.cy) = (None, None, None, None);
+    let named = "name = \"left\"\n";
+    folder.write("rig.toml", &rig.to_toml().replace(named, &format!("{named}intrinsics = \"left.yaml\"\n")));
+    folder.expect(0, "simulate rig.toml -o motions.jsonl");
+    for command in [
+        "simulate rig.toml -o left.yaml",
+        "simulate rig.toml -o new.jsonl --truth left.yaml",
+        "calibrate motions.jsonl --rig rig.toml -o left.yaml",
+        "calibrate motions.jsonl --camera right=right.yaml -o right.yaml",
+        "evaluate rig.toml motions.jsonl --report left.yaml",
+        "evaluate rig.toml motions.jsonl --camera right=right.yaml --report right.yaml",
+        "suggest rig.toml --with motions.jsonl -o left.yaml",
+        "export rig.toml --to static-transforms -o left.yaml",
+    ] {
+        let (_, complaint) = folder.expect(2, command);
+        assert!(complaint.contains("it is an input too"), "{command}: {complaint}");
+    }
+    assert_eq!([folder.read("left.yaml"), folder.read("right.yaml")], [lens, lens]);
+}

@@ -133,7 +133,7 @@ fn gross_outliers_among_points_are_left_out_and_counted_and_good_points_are_not(
             let is_far = |px: f64, sd: f64| px > 10.0 * sd;
             planted += all
                 .map(|camera| {
-                    let pixels = camera.pixels.iter().filter(|(px, _)| is_far(*px, truth.noise.pixels)).count();
+                    let pixels = camera.pixels.iter().filter(|pixel| is_far(pixel.px, truth.noise.pixels)).count();
                     pixels + camera.points.iter().filter(|m| is_far(**m, truth.noise.points)).count()
                 })
                 .sum::<usize>();

@@ -81,7 +81,7 @@ fn names_that_mean_something_to_html_are_text() {
     let recording = simulate(&truth, &SimulateOptions { samples: 20, ..SimulateOptions::default() }).unwrap().recording;
     let learned = calibrate(&truth, &recording, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap();
     let subject = Subject {
-        title: "<script>alert(1)</script> & co.toml",
+        about: "<script>alert(1)</script> & co.toml".into(),
         before: &truth,
         calibration: &learned,
         recording: &recording,
@@ -136,7 +136,7 @@ fn a_page_of_samples_without_joints_leaves_out_what_hangs_on_inner_links() {
     let all = residuals(&learned.rig, &recording).unwrap();
     assert!(!all.is_empty() && all.iter().all(|residual| residual.feature != 0 && residual.distance() < 3.0));
     let subject = Subject {
-        title: "tips",
+        about: "tips".into(),
         before: &truth,
         calibration: &learned,
         recording: &recording,
@@ -246,7 +246,7 @@ fn the_page_of_a_task_shows_what_its_hand_and_its_target_carry() {
     let scene = Scene::parse(text, "ur5-wrench", Path::new(".")).unwrap();
     let run = handeye::scene::run(Some(&known), &scene, &mut |_| ControlFlow::Continue(())).unwrap();
     let world = scene.rig.as_ref().unwrap_or(&known);
-    let page = servo_html("wrench", world, true, &run).unwrap();
+    let page = servo_html(&"wrench".into(), world, true, &run).unwrap();
     let drawn = data(&page, 2);
     let names = &run.header.features;
     assert!(names.iter().all(|name| known.features.iter().all(|feature| feature.name != *name)), "{names:?}");

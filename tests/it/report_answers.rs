@@ -10,9 +10,18 @@ use nalgebra::Vector3;
 use serde_json::Value;
 use std::ops::ControlFlow;
 
-/// A section of a page, by its id.
-fn section<'a>(page: &'a str, id: &str) -> &'a str {
-    page.split(&format!("<section id=\"{id}\">")).nth(1).unwrap().split("</section>").next().unwrap()
+/// A section of a page, by its id; empty where there is none.
+pub fn section<'a>(page: &'a str, id: &str) -> &'a str {
+    let from = page.split(&format!("<section id=\"{id}\">")).nth(1).unwrap_or_default();
+    from.split("</section>").next().unwrap_or_default()
+}
+
+/// Words as a page has them: what stands between backticks is code.
+pub fn shown(words: &str) -> String {
+    let mut parts = words.split('`');
+    let first = parts.next().unwrap().to_owned();
+    let tags = ["<code>", "</code>"].into_iter().cycle();
+    first + &tags.zip(parts).map(|(tag, part)| format!("{tag}{part}")).collect::<String>()
 }
 
 /// A UR5 of which nothing but the joints is known, 0.3 px of noise, readings of two samples exchanged and one image of another moment.
@@ -38,7 +47,7 @@ fn spoilt() -> (Rig, Recording) {
 fn learned(before: &Rig, recording: &Recording) -> (Calibration, String) {
     let calibration = calibrate(before, recording, &Options::default(), &mut |_| ControlFlow::Continue(())).unwrap();
     let subject =
-        Subject { title: "spoilt", before, calibration: &calibration, recording, suggestion: None, tables: &[] };
+        Subject { about: "spoilt".into(), before, calibration: &calibration, recording, suggestion: None, tables: &[] };
     let page = html(&subject).unwrap();
     (calibration, page)
 }
@@ -74,14 +83,9 @@ fn a_page_answers_first_whether_the_fit_is_good_how_well_the_tip_is_known_and_wh
     let summary = section(&page, "summary");
     assert_eq!(summary.matches("left out").count(), 5, "the figure, the heading and three findings: {summary}");
     for camera in ["left", "right"] {
-        let against_arm = format!("the pose of camera `{camera}` against the arm is known to ");
+        let against_arm = format!("the pose of camera <code>{camera}</code> against the arm is known to ");
         assert!(summary.contains(&against_arm), "{camera}: {summary}");
     }
-    // Cells of what moves together stay short.
-    let cells = section(&page, "open").split("<td>").skip(1).map(|cell| cell.split("</td>").next().unwrap());
-    let cells: Vec<&str> = cells.step_by(4).collect();
-    assert!(!cells.is_empty() && cells.iter().all(|cell| cell.matches(", ").count() <= 5), "{cells:#?}");
-    assert!(cells.iter().any(|cell| cell.contains(" more")), "{cells:#?}");
 }
 
 #[test]
@@ -159,7 +163,7 @@ fn an_evaluation_tells_the_error_with_and_without_what_does_not_fit_and_names_it
         "mistakes of the recording rather than of the rig",
         "Without what does not fit, it predicts these samples about as well",
     ] {
-        assert!(said.contains(words) && page.contains(words), "{words}: {said}");
+        assert!(said.contains(words) && page.contains(&shown(words)), "{words}: {said}");
     }
     assert!(said.contains("without what does not fit, as calibrate leaves it out:"), "{said}");
 }
@@ -167,16 +171,19 @@ fn an_evaluation_tells_the_error_with_and_without_what_does_not_fit_and_names_it
 #[test]
 fn a_camera_that_was_always_worse_than_the_others_is_not_said_to_be_off() {
     let truth = random_rig(6, 4, 12, 2);
-    let options = SimulateOptions { samples: 40, seed: 2, ..SimulateOptions::default() };
-    let mut recording = simulate(&truth, &options).unwrap().recording;
-    // Five times the noise of 0.3 px, by turns in four directions: one camera of four then has about twice the error of all together.
-    for (number, seen) in recording.samples.iter_mut().flat_map(|sample| &mut sample.pixels).enumerate() {
-        if seen.camera == 0 {
-            seen.pixel[number % 2] += if number % 4 < 2 { 1.5 } else { -1.5 };
+    let record = |seed: u64| {
+        let options = SimulateOptions { samples: 40, seed, ..SimulateOptions::default() };
+        let mut recording = simulate(&truth, &options).unwrap().recording;
+        // Five times the noise of 0.3 px, by turns in four directions: one camera of four then has about twice the error of all together.
+        for (number, seen) in recording.samples.iter_mut().flat_map(|sample| &mut sample.pixels).enumerate() {
+            if seen.camera == 0 {
+                seen.pixel[number % 2] += if number % 4 < 2 { 1.5 } else { -1.5 };
+            }
         }
-    }
-    let (learned, _) = learned(&truth, &recording);
-    let judged = evaluate(&learned.rig, &recording).unwrap();
+        recording
+    };
+    let (learned, _) = learned(&truth, &record(2));
+    let judged = evaluate(&learned.rig, &record(3)).unwrap();
     let of_camera = judged.fitting.cameras[0].errors.rms_px / judged.fitting.total.rms_px;
     assert!(of_camera > 1.5, "{of_camera}");
     let steps = evaluation_steps(&learned.rig, &judged);
@@ -244,7 +251,7 @@ fn where_nothing_is_metric_no_length_has_a_unit() {
     let tip = calibration.report.tip.unwrap();
     assert!(!calibration.report.metric && !tip.metric);
     assert!(verdict.contains(&format!("The tip's position is known to {tip}")), "{verdict}");
-    assert!(summary.contains("the pose of camera `") && summary.contains("in the model's unit"), "{summary}");
+    assert!(summary.contains("the pose of camera <code>") && summary.contains("in the model's unit"), "{summary}");
     assert!(!verdict.contains(" mm") && !summary.contains(" mm"), "{verdict}{summary}");
 }
 

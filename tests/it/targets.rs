@@ -2,6 +2,7 @@
 use crate::cli::Folder;
 use handeye::calibrate::{Calibration, Options, calibrate};
 use handeye::recording::{RecordedCamera, Recording, Sample, TargetDetection};
+use handeye::report::{Subject, html};
 use handeye::rig::{Camera, Model, Parent, PoseNoise, Rig};
 use handeye::solvers::Pose;
 use nalgebra::{Matrix6, Vector3, Vector6};
@@ -354,8 +355,14 @@ fn a_clock_that_is_ahead_is_found_where_robot_and_images_were_recorded_apart() {
             samples.push(Sample { time: Some(time + ahead), pose: None, ..image });
         }
         samples.sort_by(|a, b| a.time.partial_cmp(&b.time).unwrap());
-        let learned = learn(&world.rig(), &recording(samples));
+        let recording = recording(samples);
+        let learned = learn(&world.rig(), &recording);
         let (offset, sd) = learned.report.targets.as_ref().unwrap().time_offset.unwrap();
+        let (about, before) = ("clocks".into(), &world.rig());
+        let calibration = &learned;
+        let page = html(&Subject { about, before, calibration, recording: &recording, suggestion: None, tables: &[] });
+        let words = format!("the images' clock is {:.2} ms ahead of the robot's (± {:.2} ms)", 1e3 * offset, 1e3 * sd);
+        assert!(page.unwrap().contains(&words), "{words}");
         assert!((offset - ahead).abs() < 5.0 * sd && sd < 1e-3, "seed {seed}: {offset} ± {sd}, true {ahead}");
         let errors = errors(&learned.rig, &world);
         assert!(errors.iter().all(|error| *error < 0.003), "seed {seed}: {errors:?}");

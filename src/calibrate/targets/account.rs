@@ -28,6 +28,27 @@ pub struct TargetReport {
     pub pixels_unused: bool,
 }
 
+impl TargetReport {
+    /// What else there is to say in words: the clock, the scale, closed forms that disagree, and pixels that were not used.
+    pub fn remarks(&self) -> Vec<String> {
+        let clock = self.time_offset.map(|(offset, sd)| {
+            format!("the images' clock is {:.2} ms ahead of the robot's (± {:.2} ms)", 1e3 * offset, 1e3 * sd)
+        });
+        let scale = self.scale.map(|(scale, sd)| {
+            format!(
+                "the targets' translations are {scale:.4} times (± {sd:.4}) the robot's: they are monocular, or the target's size is wrong"
+            )
+        });
+        let disagreement = |Disagreement { name, rot, xyz }: &Disagreement| {
+            let (deg, mm) = (rot.to_degrees(), 1e3 * xyz);
+            format!("the closed form of {name} disagrees: {deg:.1}° and {mm:.0} mm from what was learned")
+        };
+        let unused = "pixels were recorded too, without joints, and were not used";
+        let unused = self.pixels_unused.then(|| unused.to_owned());
+        clock.into_iter().chain(scale).chain(self.disagreements.iter().map(disagreement)).chain(unused).collect()
+    }
+}
+
 /// A closed form that does not agree with what was learned.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disagreement {
