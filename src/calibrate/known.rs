@@ -27,26 +27,35 @@ pub(super) fn known_parts(setup: &Setup) -> Option<(State, Vec<bool>, Vec<bool>)
     Some((state, cameras, features))
 }
 
+/// Samples that place the base, spread evenly over the recording: all candidates are judged on all of them.
+const SAMPLES: usize = 100;
+
 /// Puts the base where known cameras see known features: the candidate of all images that explains most of them.
 fn place_base(setup: &Setup, state: &mut State, cameras: &[bool], features: &[bool]) {
-    let mut images: BTreeMap<(usize, usize), Vec<&Observation>> = BTreeMap::new();
+    let mut samples: BTreeMap<usize, BTreeMap<usize, Vec<&Observation>>> = BTreeMap::new();
     for seen in setup.observations.iter().filter(|seen| cameras[seen.camera] && features[seen.feature]) {
         if state.placed[seen.sample] && is_across(setup, seen) {
-            images.entry((seen.sample, seen.camera)).or_default().push(seen);
+            samples.entry(seen.sample).or_default().entry(seen.camera).or_default().push(seen);
         }
     }
-    let all: Vec<&Observation> = images.values().flatten().copied().collect();
-    let candidates = images.iter().filter(|(_, seen)| seen.len() >= IN_IMAGE).flat_map(|(&(sample, camera), seen)| {
+    let every = samples.len().div_ceil(SAMPLES).max(1);
+    let samples: Vec<_> = samples.into_iter().step_by(every).collect();
+    let images = || {
+        samples.iter().flat_map(|(sample, images)| images.iter().map(move |(camera, seen)| (*sample, *camera, seen)))
+    };
+    let candidates = images().filter(|(.., seen)| seen.len() >= IN_IMAGE).flat_map(|(sample, camera, seen)| {
         let tip_from_base = state.model.tip(&state.joints[sample]).inverse();
         world_from_tip(setup, camera, seen).into_iter().map(move |tip| tip * tip_from_base)
     });
-    let usual_error = |base: &Pose| {
-        let mut moved = state.clone();
+    let mut moved = state.clone();
+    let mut usual_error = |base: &Pose| {
         moved.model.base = *base;
-        let links = moved.all_links(setup);
-        let distance =
-            |seen: &&Observation| seen.error(&moved.model, &links[seen.sample]).norm() / setup.sd(seen.kind());
-        median(&mut all.iter().map(distance).collect::<Vec<_>>())
+        let distances = samples.iter().flat_map(|(sample, images)| {
+            let links = moved.links(setup, *sample);
+            let distance = |seen: &&Observation| seen.error(&moved.model, &links).norm() / setup.sd(seen.kind());
+            images.values().flatten().map(distance).collect::<Vec<f64>>()
+        });
+        median(&mut distances.collect::<Vec<f64>>())
     };
     let best = candidates.map(|base| (usual_error(&base), base)).min_by(|a, b| a.0.total_cmp(&b.0));
     if let Some((_, base)) = best {
