@@ -1,6 +1,6 @@
 //! `handeye monitor`: watches a learned rig over recordings, and says what of it moved.
 use super::answer::Answer;
-use super::inputs::{check_output, read_recordings, read_rig};
+use super::inputs::{check_output, files_read, read_recordings, read_rig};
 use super::reading::Reading;
 use super::words::count;
 use clap::Args;
@@ -40,15 +40,17 @@ impl MonitorCommand {
         let input = read_rig(&self.rig)?;
         let recording = read_recordings(&self.recordings, Some(&input), &self.reading)?;
         if let Some(output) = &self.output {
-            check_output(output, &self.recordings)?;
+            // LEARNED itself may be replaced, what it names not.
+            check_output(output, &files_read(&self.recordings, Some(&self.rig), &self.reading))?;
         }
         let options = MonitorOptions { false_alarm_rate: self.false_alarms, ..MonitorOptions::default() };
         let mut monitor = Monitor::new(&input.rig, &recording, options)?;
         let (mut text, mut events) = (String::new(), Vec::new());
-        let (mut changes, mut skipped) = (0, 0);
+        let (mut changes, mut followed, mut skipped) = (0, 0, 0);
         for (sample, measured) in recording.samples.iter().enumerate() {
             let event = monitor.observe(measured);
             changes += usize::from(matches!(event, Event::Changed(_)));
+            followed += usize::from(matches!(event, Event::Followed { .. }));
             skipped += usize::from(event == Event::Skipped);
             if let Some((line, object)) = tell(sample, &event, &input.rig) {
                 text += &line;
@@ -62,7 +64,12 @@ impl MonitorCommand {
             let unused = if points > 0 { "; points of depth cameras are not watched" } else { "" };
             return Err(Error::NotEnoughData(format!("{problem}: fewer cannot be told from wrong detections{unused}")));
         }
-        let summary = if changes == 0 { "no change".to_owned() } else { count(changes, "change") };
+        let summary = if changes == 0 { "no sudden change".to_owned() } else { count(changes, "sudden change") };
+        let summary = match followed {
+            0 if changes == 0 => "no change".to_owned(),
+            0 => count(changes, "change"),
+            _ => format!("{summary}; a slow drift was followed in {}", count(followed, "small step")),
+        };
         text += &format!("{summary} in {}\n", count(watched, "sample"));
         if skipped > 0 {
             text += &format!(
@@ -82,6 +89,7 @@ impl MonitorCommand {
             "skipped": skipped,
             "points_not_watched": points,
             "changes": changes,
+            "followed": followed,
             "false_alarm_rate": self.false_alarms,
             "gradient_norm": monitor.gradient_norm(),
             "left_out": left_out,

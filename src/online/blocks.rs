@@ -208,12 +208,14 @@ const WIDTH: f64 = 3.0;
 const EXPLAINED: f64 = 2.5;
 
 /// Explanations whose scores differ by less are the same.
-const SAME: f64 = 1e-3;
+pub(super) const SAME: f64 = 1e-3;
+
+/// Steps after which a part has been moved to where it explains samples best.
+pub(super) const FIT_STEPS: usize = 30;
 
 /// Moves each part alone to explain the samples: scores, best first, and the model that the best leads to. Where not even the
 /// best explains them, [`Cause::Unexplained`] comes first and the model is as before.
 pub(super) fn explain(model: &Model, samples: &[Seen], sigma: f64, usual_px: f64) -> (Vec<Score>, Model) {
-    const STEPS: usize = 30;
     let n = samples.iter().map(|sample| 2 * sample.detections.len()).sum::<usize>() as f64;
     let mut found: Vec<(Score, Model)> = Vec::new();
     for cause in causes(model) {
@@ -221,7 +223,7 @@ pub(super) fn explain(model: &Model, samples: &[Seen], sigma: f64, usual_px: f64
         // From wherever the change has put it, along the convex loss; then with wrong detections losing their pull.
         let mut loss = Ok(f64::INFINITY);
         for kind in [Loss::Huber(WIDTH), Loss::Cauchy(WIDTH)] {
-            loss = Problem::new(&moved, samples.iter(), sigma, kind).fit(&cause, STEPS, &mut moved);
+            loss = Problem::new(&moved, samples.iter(), sigma, kind).fit(&cause, FIT_STEPS, &mut moved);
         }
         // A part that nothing of the samples depends on explains nothing.
         let Ok(loss) = loss else { continue };

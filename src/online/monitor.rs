@@ -1,5 +1,5 @@
 //! Watches samples one after the other.
-use super::blocks::{Problem, causes, distances, explain, zero_of};
+use super::blocks::{FIT_STEPS, Problem, SAME, causes, distances, explain, zero_of};
 use super::null::{Null, WINDOW, window_p_value};
 use super::seen::{Names, Seen};
 use super::{Cause, Change, Event, MonitorOptions};
@@ -169,11 +169,12 @@ impl Monitor {
         while self.buffer.len() > self.options.buffer {
             self.buffer.pop_front();
         }
-        self.since_look = 0;
+        (self.since_look, self.usual_norm) = (0, None);
         Event::Relearned { cause, samples: samples_used, rig: Box::new(self.rig.clone()) }
     }
 
-    /// One damped step of the part that explains the buffer best, where the gradient says that something drifts.
+    /// One damped step of the part that explains the buffer best, where the gradient says that something drifts and a part that moved
+    /// explains the buffer better than none.
     fn follow(&mut self) -> Event {
         self.since_look += 1;
         if self.buffer.len() < self.options.buffer || self.since_look < LOOK {
@@ -185,18 +186,28 @@ impl Monitor {
         if norm < self.options.follow_ratio * usual {
             return Event::Unchanged;
         }
-        let n = self.buffer.iter().map(|seen| 2 * seen.detections.len()).sum::<usize>() as f64;
-        let mut best: Option<(f64, Cause, Model)> = None;
-        for cause in causes(&self.model) {
+        let fitted = |cause: &Cause, steps: usize| {
             let mut model = self.model.clone();
             let mut problem = Problem::new(&model, self.buffer.iter(), self.null.sigma(), Loss::Cauchy(3.0));
-            let Ok(loss) = problem.fit(&cause, 1, &mut model) else { continue };
-            let bic = loss + cause.freedom() * n.ln();
-            if best.as_ref().is_none_or(|(least, _, _)| bic < *least) {
-                best = Some((bic, cause, model));
+            problem.fit(cause, steps, &mut model).map(|loss| (loss, model))
+        };
+        let n = self.buffer.iter().map(|seen| 2 * seen.detections.len()).sum::<usize>() as f64;
+        let Ok((unmoved, _)) = fitted(&Cause::Unexplained, 0) else { return Event::Unchanged };
+        // Which part it is, by Akaike's criterion: with Schwarz's a joint of one freedom would stand in for a camera of six that moved little.
+        // That one is, by Schwarz's.
+        let mut best = (f64::INFINITY, f64::INFINITY, Cause::Unexplained);
+        for cause in causes(&self.model) {
+            let Ok((loss, _)) = fitted(&cause, FIT_STEPS) else { continue };
+            let aic = loss + 2.0 * cause.freedom();
+            if aic < best.0 - SAME {
+                best = (aic, loss + cause.freedom() * n.ln(), cause);
             }
         }
-        let Some((_, cause, model)) = best else { return Event::Unchanged };
+        let (_, bic, cause) = best;
+        if bic.is_nan() || bic >= unmoved {
+            return Event::Unchanged;
+        }
+        let Ok((_, model)) = fitted(&cause, 1) else { return Event::Unchanged };
         self.take(&cause, model);
         Event::Followed { cause, gradient_norm: norm }
     }
@@ -211,21 +222,24 @@ impl Monitor {
     /// The rig with the part that moved as the model has it. Its standard deviations are no longer those of the fit.
     fn take(&mut self, cause: &Cause, model: Model) {
         let rig = &mut self.rig;
-        let stale = match *cause {
+        let stale: Vec<String> = match *cause {
             Cause::Camera(camera) => {
                 rig.cameras[camera].pose = Some(model.cameras[camera].pose);
-                format!("cameras.{}.pose", rig.cameras[camera].name)
+                vec![format!("cameras.{}.pose", rig.cameras[camera].name)]
             }
             Cause::Structure => {
                 let moved = rig.features.iter_mut().zip(&model.features);
-                moved
-                    .filter(|(feature, _)| feature.parent == Parent::Tip)
-                    .for_each(|(feature, moved)| feature.xyz = Some(moved.xyz.into()));
-                "features.".to_owned()
+                let on_tip = moved.filter(|(feature, _)| feature.parent == Parent::Tip);
+                on_tip
+                    .map(|(feature, moved)| {
+                        feature.xyz = Some(moved.xyz.into());
+                        format!("features.{}.", feature.name)
+                    })
+                    .collect()
             }
             Cause::Base => {
                 rig.robot.base = Some(model.base);
-                "robot.base".to_owned()
+                vec!["robot.base".to_owned()]
             }
             Cause::Joint(joint) => {
                 let index = zero_of(&model, joint);
@@ -233,12 +247,12 @@ impl Monitor {
                 let is_offset = index == LINK_PARAMETERS * joint;
                 let slot = if is_offset { &mut row.offset } else { &mut row.d };
                 *slot = Some(model.parameters[index]);
-                format!("robot.joints.{}.{}", row.name, if is_offset { "offset" } else { "d" })
+                vec![format!("robot.joints.{}.{}", row.name, if is_offset { "offset" } else { "d" })]
             }
             Cause::Unexplained => return,
         };
         if let Some(fit) = &mut rig.fit {
-            fit.sd.retain(|path, _| !path.starts_with(&stale));
+            fit.sd.retain(|path, _| !stale.iter().any(|stale| path.starts_with(stale)));
         }
         self.model = model;
     }

@@ -181,6 +181,7 @@ fn no_file_that_is_read_is_written_over() {
         "evaluate rig.toml motions.jsonl --report left.yaml",
         "evaluate rig.toml motions.jsonl --camera right=right.yaml --report right.yaml",
         "suggest rig.toml --with motions.jsonl -o left.yaml",
+        "monitor rig.toml motions.jsonl -o left.yaml",
         "export rig.toml --to static-transforms -o left.yaml",
     ] {
         let (_, complaint) = folder.expect(2, command);

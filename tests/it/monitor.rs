@@ -3,7 +3,7 @@
 mod change;
 
 use change::{KINDS, learned, look, record, unchanged};
-use handeye::online::{Event, Monitor, MonitorOptions};
+use handeye::online::{Cause, Event, Monitor, MonitorOptions};
 use handeye::simulate::{SimulateOptions, simulate};
 
 /// Of 10 changes of each kind that are seen with a probability of 0.95, fewer than 8 are with one of 1.2 %; over all 90, 79 or
@@ -67,4 +67,34 @@ fn one_bad_sample_is_no_change() {
     recording.samples[40].joints.as_mut().unwrap()[1] += 0.3;
     let mut monitor = Monitor::new(&rigs.learned, &recording, MonitorOptions::default()).unwrap();
     assert!(recording.samples.iter().all(|sample| monitor.observe(sample) == Event::Unchanged));
+}
+
+/// A camera that creeps by half a millimetre is no sudden change, and not one of the joints either.
+#[test]
+fn a_camera_that_creeps_is_followed_and_the_other_parts_are_not() {
+    let mut followed = 0;
+    for seed in 1..=5 {
+        let rigs = learned(seed).expect("rigs of these seeds are learned");
+        let mut moved = rigs.truth.clone();
+        moved.cameras[0].pose.as_mut().unwrap().translation.x += 0.0005;
+        let (mut recording, after) = (record(&rigs.truth, 150, 100 + seed), record(&moved, 250, 200 + seed));
+        recording.samples.extend(after.samples);
+        let mut monitor = Monitor::new(&rigs.learned, &recording, MonitorOptions::default()).unwrap();
+        let sds = |rig: &handeye::rig::Rig| rig.fit.as_ref().map_or(0, |fit| fit.sd.len());
+        let before = sds(monitor.rig());
+        for (index, sample) in recording.samples.iter().enumerate() {
+            match monitor.observe(sample) {
+                Event::Followed { cause, .. } => {
+                    assert!(index >= 150 && cause == Cause::Camera(0), "seed {seed}, sample {index}: {cause:?}");
+                    followed += 1;
+                }
+                Event::Changed(change) => assert_eq!(change.cause, Cause::Camera(0), "seed {seed}, sample {index}"),
+                _ => {}
+            }
+        }
+        println!("seed {seed}: {followed}");
+        // Only what was followed has lost its standard deviation.
+        assert!(before > 1 && sds(monitor.rig()) + 1 >= before, "seed {seed}: {before}");
+    }
+    assert!(followed > 0);
 }
