@@ -77,7 +77,7 @@ fn learn(cases: &Cases) -> Result<Rig, handeye::Error> {
         ..RecordedCamera::default()
     };
     let mut recording = Recording {
-        joints: cases.rig.robot.joints.iter().map(|joint| joint.name.clone()).collect(),
+        joints: cases.rig.robot.joint_names(),
         cameras: cases.rig.cameras.iter().map(camera).collect(),
         features: cases.rig.features.iter().map(|feature| feature.name.clone()).collect(),
         ..Recording::default()

@@ -4,7 +4,7 @@ use crate::errors::{raise, unusable};
 use crate::recording_arrays::{Arrays, read_camera};
 use crate::rig::AnyRig;
 use handeye::recording::{
-    self, Actions, Angles, BagOptions, Format, OpenOptions, Opened, RecordedCamera, TableOptions,
+    self, Actions, Angles, BagOptions, Format, OpenOptions, Opened, RecordedCamera, TableOptions, WithoutEffect,
 };
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -56,19 +56,12 @@ fn in_degrees(given: &Bound<'_, PyAny>) -> PyResult<Option<Vec<String>>> {
     }
 }
 
-fn refuse_without_effect(options: &[(&str, bool)], kind: &str, is_read: bool) -> PyResult<()> {
-    match options.iter().find(|(_, is_given)| *is_given && !is_read) {
-        Some((name, _)) => Err(unusable(format!("{name}: none of the recordings is {kind}, so that it has no effect"))),
-        None => Ok(()),
-    }
-}
-
 #[pymethods]
 impl Recording {
     /// Reads recordings: ROS 2 bags (``.mcap``), tables (``.csv``, ``.tsv``, ``.parquet``), LeRobot datasets (a folder), and JSON Lines;
     /// several of one robot are joined in their order.
     ///
-    /// rig: its joints give names and order; joints: names from base to tip, in bags and tables. cameras: name -> calibration file (YAML of ROS,
+    /// rig: its joints give names and order; joints: names from base to tip, of those in the file. cameras: name -> calibration file (YAML of ROS,
     /// OpenCV or Kalibr), or what is known as in ``from_arrays``; a lens replaces that of the file.
     ///
     /// For bags: ``joint_topic`` and ``pose_topic``, where there are several; ``frames``, (base, tip) for tip poses from TF;
@@ -103,26 +96,6 @@ impl Recording {
             Paths::Several(paths) => paths,
         };
         let degrees = degrees.as_ref().map(in_degrees).transpose()?.flatten();
-        let formats: Vec<Format> = paths.iter().map(|path| Format::of(path)).collect();
-        let of_bags = [
-            ("joint_topic", joint_topic.is_some()),
-            ("pose_topic", pose_topic.is_some()),
-            ("frames", frames.is_some()),
-            ("camera_topics", camera_topics.is_some()),
-            ("join", join.is_some()),
-        ];
-        let of_tables = [
-            ("degrees", degrees.is_some()),
-            ("radians", radians),
-            ("actions", actions.is_some()),
-            ("episodes", episodes.is_some()),
-        ];
-        let is_bag = |format: &Format| *format == Format::Bag;
-        let is_table = |format: &Format| !matches!(format, Format::Bag | Format::JsonLines);
-        refuse_without_effect(&of_bags, "a bag", formats.iter().any(is_bag))?;
-        let has_columns = formats.iter().any(|format| *format != Format::JsonLines);
-        refuse_without_effect(&[("joints", joints.is_some())], "a bag or a table", has_columns)?;
-        refuse_without_effect(&of_tables, "a table", formats.iter().any(is_table))?;
         if degrees.is_some() && radians {
             return Err(unusable("degrees and radians: joints are in one of them"));
         }
@@ -137,12 +110,9 @@ impl Recording {
             Some("motions") => Actions::Motions,
             Some(other) => return Err(unusable(format!("actions: `{other}` is neither targets nor motions"))),
         };
-        let names =
-            |rig: &AnyRig<'_>| rig.inner.robot.joints.iter().map(|joint| joint.name.clone()).collect::<Vec<String>>();
-        let known = rig.as_ref().map(names);
         let options = OpenOptions {
             joints: joints.unwrap_or_default(),
-            known_joints: known.unwrap_or_default(),
+            known_joints: rig.as_ref().map_or_else(Vec::new, |rig| rig.inner.robot.joint_names()),
             cameras: cameras
                 .iter()
                 .flatten()
@@ -157,6 +127,10 @@ impl Recording {
             },
             table: TableOptions { angles, actions, episodes: episodes.unwrap_or_default() },
         };
+        let formats: Vec<Format> = paths.iter().map(|path| Format::of(path)).collect();
+        if let Some(WithoutEffect { option, of }) = options.without_effect(&formats) {
+            return Err(unusable(format!("{option}: none of the recordings is {of}, so that it has no effect")));
+        }
         let read = py.detach(|| recording::Recording::open_all(&paths, &options));
         let Opened { recording, notes, .. } = read.map_err(raise)?;
         let inner = Arc::new(recording);

@@ -85,7 +85,7 @@ impl Arrays<'_, '_> {
         let width =
             |array: &Option<Floats<'_>>| array.as_ref().and_then(|array| array.as_array().shape().get(1).copied());
         let n = width(&self.joints).or_else(|| width(&self.joint_actions)).unwrap_or(0);
-        let of_rig = || self.rig.map(|rig| rig.robot.joints.iter().map(|joint| joint.name.clone()).collect::<Vec<_>>());
+        let of_rig = || self.rig.map(|rig| rig.robot.joint_names());
         let given = self.joint_names.clone().or_else(|| of_rig().filter(|names| !names.is_empty() && n > 0));
         let names = given.unwrap_or_else(|| (1..=n).map(|i| format!("j{i}")).collect());
         if n > 0 && names.len() != n {

@@ -212,9 +212,9 @@ def test_options_of_other_formats_and_words_that_say_nothing_are_refused(motions
     motions.save(path)
     for wrong, message in [
         ({"frames": ("base", "tip")}, "frames: none of the recordings is a bag, so that it has no effect"),
-        ({"camera_topics": {}}, "camera_topics: none of the recordings is a bag"),
+        ({"camera_topics": {"/tags": None}}, "camera_topics: none of the recordings is a bag"),
         ({"degrees": True}, "degrees: none of the recordings is a table"),
-        ({"joints": ["a"]}, "joints: none of the recordings is a bag or a table, so that it has no effect"),
+        ({"joints": ["a"]}, "there is no joint `a`"),
         ({"episodes": [0]}, "episodes: none of the recordings is a table"),
         ({"cameras": {"nose": {"size": (640, 480)}}}, "there are no images of a camera `nose`"),
     ]:

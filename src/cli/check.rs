@@ -151,7 +151,7 @@ fn tell(diagnosis: &Diagnosis, noise: &Noise) -> String {
 
 fn describe(rig: &Rig, file: &str, counts: &Counts) -> String {
     let mut text = rig.name.as_ref().map_or_else(|| format!("{file}\n"), |name| format!("{file}: {name}\n"));
-    let joints: Vec<String> = rig.robot.joints.iter().map(|joint| joint.name.clone()).collect();
+    let joints = rig.robot.joint_names();
     if joints.is_empty() {
         text += "  joints    as many as the recording has\n";
     } else {

@@ -30,7 +30,7 @@ Examples:
   handeye convert motions.csv --joints q1,q2,q3 --degrees --camera left=640x480 -o motions.jsonl
   handeye convert so100_dataset --degrees --joints shoulder_pan,shoulder_lift,elbow_flex,wrist_flex,wrist_roll -o motions.jsonl")]
 pub struct Convert {
-    /// A bag (.mcap, or its folder), a table (.csv, .tsv, .parquet) or the folder of a LeRobot dataset
+    /// A bag (.mcap, or its folder), a table (.csv, .tsv, .parquet), the folder of a LeRobot dataset, or a recording of which a part is meant
     #[arg(value_name = "FILE")]
     input: PathBuf,
     #[command(flatten)]
@@ -43,8 +43,7 @@ pub struct Convert {
 impl Convert {
     pub fn run(&self) -> Result<Answer, Error> {
         check_output(&self.output, std::slice::from_ref(&self.input))?;
-        self.reading.refuse_without_effect(&[&self.input])?;
-        let Opened { recording, notes, .. } = Recording::open_with(&self.input, &self.reading.options()?)?;
+        let Opened { recording, notes, .. } = Recording::open_with(&self.input, &self.reading.options(&[&self.input])?)?;
         recording.write(&self.output)?;
         Ok(written(&self.output, &recording, &notes))
     }

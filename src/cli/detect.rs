@@ -67,7 +67,6 @@ impl Detect {
         let inputs: Vec<PathBuf> = self.images.iter().map(PathBuf::from).chain(self.states.clone()).collect();
         check_output(&self.output, &inputs)?;
         let patterns = self.patterns()?;
-        let options = self.reading.options()?;
         let is_bag = |file: &&Path| Format::of(file) == Format::Bag;
         if let Some(bag) = self.states.as_deref().filter(is_bag) {
             let bag = bag.display();
@@ -78,7 +77,7 @@ impl Detect {
         }
         let images = self.images.iter().map(Path::new);
         let read: Vec<&Path> = images.filter(is_bag).chain(self.states.as_deref()).collect();
-        self.reading.refuse_without_effect(&read)?;
+        let options = self.reading.options(&read)?;
         let (mut recording, mut notes) = match (&read[..], &self.images[..]) {
             ([bag], [_]) if self.states.is_none() => in_bag(bag, &patterns, &options)?,
             (read, _) if read.len() == usize::from(self.states.is_some()) => self.in_folders(&patterns, options)?,

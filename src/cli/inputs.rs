@@ -93,10 +93,9 @@ pub fn read_with_notes(
     reading: &Reading,
     new: &[String],
 ) -> Result<(Recording, Vec<String>), Error> {
-    reading.refuse_without_effect(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
-    let known_joints =
-        rig.map_or_else(Vec::new, |input| input.rig.robot.joints.iter().map(|joint| joint.name.clone()).collect());
-    let options = OpenOptions { known_joints, ..reading.options()? };
+    let files: Vec<&Path> = paths.iter().map(PathBuf::as_path).collect();
+    let known_joints = rig.map_or_else(Vec::new, |input| input.rig.robot.joint_names());
+    let options = OpenOptions { known_joints, ..reading.options(&files)? };
     let is_rig = |path: &&PathBuf| path.extension().is_some_and(|extension| extension == "toml") && path.is_file();
     if let Some(path) = paths.iter().find(is_rig) {
         let problem = format!("{}: that is a rig file, and a recording is expected here", path.display());
@@ -119,7 +118,7 @@ fn mismatch(input: &RigInput, recording: &Recording, new: &[String]) -> Option<S
         let named = if joints.is_empty() { joints } else { format!("; those of the recording: {joints}") };
         return Some(format!("the recording has {}, the rig {name} has {ours}{named}", count(theirs, "joint")));
     }
-    let names: Vec<String> = rig.robot.joints.iter().map(|joint| joint.name.clone()).collect();
+    let names = rig.robot.joint_names();
     if is_in_another_order(&recording.joints, &names) {
         let (theirs, ours) = (recording.joints.join(", "), names.join(", "));
         return Some(format!("the joints are in the order {theirs}, those of the rig {name} in the order {ours}"));

@@ -1,8 +1,8 @@
-//! What of bags and tables is meant, for the commands that read recordings.
+//! What of files is meant, for the commands that read recordings.
 use super::inputs::read_camera;
 use clap::{Args, ValueEnum};
 use handeye::Error;
-use handeye::recording::{Actions, Angles, BagOptions, Format, OpenOptions, TableOptions};
+use handeye::recording::{Actions, Angles, BagOptions, Format, OpenOptions, TableOptions, WithoutEffect};
 use std::path::{Path, PathBuf};
 
 #[derive(Args, Default)]
@@ -30,35 +30,12 @@ pub struct OfFiles {
 }
 
 impl Reading {
-    /// Refuses options that are nothing to any of the files that are read.
-    pub fn refuse_without_effect(&self, files: &[&Path]) -> Result<(), Error> {
-        let formats: Vec<Format> = files.iter().map(|file| Format::of(file)).collect();
-        let has_bag = formats.contains(&Format::Bag);
-        let has_table = formats.iter().any(|format| matches!(format, Format::Csv | Format::Parquet | Format::LeRobot));
-        let joints = (!self.of_files.joints.is_empty()).then_some("--joints");
-        let of_table = self.of_table();
-        let without_effect = self.of_files.bag.given().filter(|_| !has_bag).or(of_table.filter(|_| !has_table));
-        let Some(option) = without_effect.or(joints.filter(|_| !has_bag && !has_table)) else { return Ok(()) };
-        let kind = |format: &Format| match format {
-            Format::JsonLines => "a recording",
-            Format::Bag => "a bag",
-            Format::Csv | Format::Parquet | Format::LeRobot => "a table",
-        };
-        let kinds = files.iter().zip(&formats).map(|(file, format)| format!("{} is {}", file.display(), kind(format)));
-        let kinds = kinds.collect::<Vec<_>>().join(", ");
-        let nothing = if kinds.is_empty() { "no bag and no table is read".to_owned() } else { kinds };
-        Err(Error::Unusable(format!("{nothing}, where {option} has no effect")))
-    }
-
     /// Refuses all of them, where there is nothing to read.
     pub fn refuse_without_recording(&self) -> Result<(), Error> {
-        let OfFiles { joints, camera, bag, .. } = &self.of_files;
-        let of_any = [(!joints.is_empty(), "--joints"), (!camera.is_empty(), "--camera")];
-        let of_any = of_any.into_iter().find(|(is_given, _)| *is_given).map(|(_, name)| name);
-        match of_any.or(bag.given()).or(self.of_table()) {
-            None => Ok(()),
-            Some(option) => Err(Error::Unusable(format!("no recording is read, where {option} has no effect"))),
+        if !self.of_files.camera.is_empty() {
+            return Err(Error::Unusable("no recording is read, where --camera has no effect".to_owned()));
         }
+        self.options(&[]).map(drop)
     }
 
     /// Files that `--camera` names; sizes are taken for some that are not there.
@@ -66,14 +43,10 @@ impl Reading {
         self.of_files.camera.iter().filter_map(|text| Some(PathBuf::from(text.split_once('=')?.1)))
     }
 
-    /// The first option of tables that is given.
-    fn of_table(&self) -> Option<&'static str> {
-        self.of_files.table.given().or(self.actions.map(|_| "--actions"))
-    }
-
-    pub fn options(&self) -> Result<OpenOptions, Error> {
+    /// What they say of the files that are read. Errors: for those that are nothing to any of the files.
+    pub fn options(&self, files: &[&Path]) -> Result<OpenOptions, Error> {
         let OfFiles { joints, camera, bag, table } = &self.of_files;
-        Ok(OpenOptions {
+        let options = OpenOptions {
             joints: joints.clone(),
             known_joints: Vec::new(),
             cameras: camera.iter().map(|text| read_camera(text)).collect::<Result<_, _>>()?,
@@ -87,7 +60,18 @@ impl Reading {
                 },
                 episodes: table.episodes.clone(),
             },
-        })
+        };
+        let formats: Vec<Format> = files.iter().map(|file| Format::of(file)).collect();
+        let Some(WithoutEffect { option, .. }) = options.without_effect(&formats) else { return Ok(options) };
+        let kind = |format: &Format| match format {
+            Format::JsonLines => "a recording",
+            Format::Bag => "a bag",
+            Format::Csv | Format::Parquet | Format::LeRobot => "a table",
+        };
+        let kinds = files.iter().zip(&formats).map(|(file, format)| format!("{} is {}", file.display(), kind(format)));
+        let kinds = kinds.collect::<Vec<_>>().join(", ");
+        let what = if kinds.is_empty() { "no recording is read" } else { &kinds };
+        Err(Error::Unusable(format!("{what}, where {} has no effect", argument(option))))
     }
 }
 
@@ -151,18 +135,6 @@ pub enum What {
 }
 
 impl OfBags {
-    /// The first option that is given.
-    fn given(&self) -> Option<&'static str> {
-        let options = [
-            (self.joint_topic.is_some(), "--joint-topic"),
-            (self.pose_topic.is_some(), "--pose-topic"),
-            (self.base_frame.is_some(), "--base-frame"),
-            (!self.camera_topic.is_empty(), "--camera-topic"),
-            (self.join.is_some(), "--join"),
-        ];
-        options.into_iter().find(|(is_given, _)| *is_given).map(|(_, name)| name)
-    }
-
     fn options(&self) -> BagOptions {
         let camera = |text: &String| match text.split_once('=') {
             Some((topic, name)) => (topic.to_owned(), Some(name.to_owned())),
@@ -179,22 +151,21 @@ impl OfBags {
 }
 
 impl OfTables {
-    /// The first option that is given.
-    fn given(&self) -> Option<&'static str> {
-        let options = [
-            (self.degrees.is_some(), "--degrees"),
-            (self.radians, "--radians"),
-            (!self.episodes.is_empty(), "--episodes"),
-        ];
-        options.into_iter().find(|(is_given, _)| *is_given).map(|(_, name)| name)
-    }
-
     fn angles(&self) -> Angles {
         match &self.degrees {
             Some(named) => Angles::Degrees(named.clone()),
             None if self.radians => Angles::Radians,
             None => Angles::Unsaid,
         }
+    }
+}
+
+/// What an option of the library is called here.
+fn argument(option: &str) -> String {
+    match option {
+        "frames" => "--base-frame".to_owned(),
+        "camera_topics" => "--camera-topic".to_owned(),
+        _ => format!("--{}", option.replace('_', "-")),
     }
 }
 

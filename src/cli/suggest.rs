@@ -90,7 +90,7 @@ fn with_lengths(mut given: Rig, learned: &Rig) -> Rig {
 fn to_visit(rig: &Rig, suggestion: &Suggestion) -> Recording {
     let sample = |one: &SuggestedSample| Sample { joints: Some(one.joints.clone()), ..Sample::default() };
     Recording {
-        joints: rig.robot.joints.iter().map(|joint| joint.name.clone()).collect(),
+        joints: rig.robot.joint_names(),
         // No lens: it would come back as known beforehand.
         cameras: rig.cameras.iter().map(name_and_size).collect(),
         features: Vec::new(),

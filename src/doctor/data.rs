@@ -17,8 +17,8 @@ const TURN: f64 = 0.05;
 /// Turns below this [rad, rms] may be the noise of arms and trackers.
 const NOISE: f64 = 0.01;
 
-/// A joint that moves by less than this [rad, m] stands still.
-const STILL: f64 = 1e-3;
+/// A joint whose readings are all within this of one another [rad, m] was not moved: encoders are as noisy.
+const UNMOVED: f64 = 1e-3;
 
 /// No arm reaches so far, and no target is so far away [m].
 const FAR: f64 = 20.0;
@@ -35,7 +35,7 @@ pub(super) fn findings(rig: &Rig, recording: &Recording, tips: &[Option<Pose>]) 
 
 /// Joints that have the names of the rig's in another order: they go by their places, so nothing that a fit says would hold.
 pub(super) fn another_order(rig: &Rig, recording: &Recording) -> Option<Finding> {
-    let names: Vec<String> = rig.robot.joints.iter().map(|joint| joint.name.clone()).collect();
+    let names = rig.robot.joint_names();
     is_in_another_order(&recording.joints, &names).then(|| Finding {
         about: About::Order,
         what: format!("the joints are in the order {}, those of the rig in another", recording.joints.join(", ")),
@@ -92,7 +92,7 @@ fn one_joint(recording: &Recording) -> Option<Finding> {
     let read: Vec<&Vec<f64>> = recording.samples.iter().filter_map(|sample| sample.joints.as_ref()).collect();
     let moves = |joint: &usize| {
         let readings = || read.iter().map(|joints| joints[*joint]);
-        readings().fold(f64::NEG_INFINITY, f64::max) - readings().fold(f64::INFINITY, f64::min) > STILL
+        readings().fold(f64::NEG_INFINITY, f64::max) - readings().fold(f64::INFINITY, f64::min) > UNMOVED
     };
     let moving: Vec<usize> = (0..recording.joints.len()).filter(moves).collect();
     let what = match moving[..] {

@@ -1,5 +1,7 @@
 //! Where the robot was when images were taken, between the rows that say it.
-use super::images::keep_actions;
+use super::actions::take_actions;
+use super::clock::{nanoseconds, seconds};
+use super::images::Pairing;
 use super::track::{At, Track};
 use super::whereabouts::Whereabouts;
 use super::{Recording, Sample};
@@ -12,14 +14,17 @@ pub(super) struct Moment<'a> {
     pub time: i64,
 }
 
-/// Joints and poses at the times of the images, interpolated; and what is commanded where images were taken at the times of two rows that follow
-/// one another.
+/// Joints and poses at the times of the images, as they are interpolated there; and what is commanded where images were taken at the times of two rows
+/// that follow one another. `spans`: from when to when rows say anything, see [`whereabouts`].
 ///
 /// Errors: in words, where rows say nothing, or nothing of the time of any image.
-pub(super) fn at_times(images: &[Moment], states: &Recording, notes: &mut Vec<String>) -> Result<Vec<Sample>, String> {
-    let (Whereabouts { moments, joints, poses }, spans) = whereabouts(images.iter().map(|image| image.time), states);
-    let times = states.samples.iter().enumerate().filter_map(|(row, sample)| Some((nanoseconds(sample.time?), row)));
-    let row_at: BTreeMap<i64, usize> = times.collect();
+pub(super) fn at_times(
+    images: &[Moment],
+    Whereabouts { joints, poses, .. }: Whereabouts,
+    spans: [Span; 2],
+    states: &Recording,
+    notes: &mut Vec<String>,
+) -> Result<Vec<Sample>, String> {
     let gaps: Vec<Gaps> = joints.iter().zip(&poses).map(|(joints, pose)| [gap(joints), gap(pose)]).collect();
     note_on_outside(images, &gaps, spans, notes)?;
     notes.extend(note_on_gaps(images, &gaps));
@@ -31,21 +36,15 @@ pub(super) fn at_times(images: &[Moment], states: &Recording, notes: &mut Vec<St
         ..Sample::default()
     };
     let mut samples: Vec<Sample> = joints.into_iter().zip(poses).map(sample).collect();
-    let row_of = |index: usize| row_at.get(moments.get(index)?).copied();
-    for (index, sample) in samples.iter_mut().enumerate() {
-        if let Some(row) = row_of(index) {
-            sample.joint_action.clone_from(&states.samples[row].joint_action);
-            sample.pose_action = states.samples[row].pose_action;
-        }
-    }
-    let leads = |index: usize| row_of(index).is_some_and(|row| row_of(index + 1) == Some(row + 1));
-    keep_actions(&mut samples, leads, states, notes);
+    let times = states.samples.iter().enumerate().filter_map(|(row, sample)| Some((nanoseconds(sample.time?), row)));
+    let row_at: BTreeMap<i64, usize> = times.collect();
+    let rows: Vec<Option<usize>> = images.iter().map(|image| row_at.get(&image.time).copied()).collect();
+    take_actions(&mut samples, &rows, states, Pairing::Time, notes);
     Ok(samples)
 }
 
 /// Where rows have the robot at some moments [ns, sorted], and from when to when they say anything of its joints and of its tip.
-pub(super) fn whereabouts(moments: impl Iterator<Item = i64>, states: &Recording) -> (Whereabouts, [Span; 2]) {
-    let moments: Vec<i64> = moments.collect();
+pub(super) fn whereabouts(moments: Vec<i64>, states: &Recording) -> (Whereabouts, [Span; 2]) {
     let mut joints: Track<Vec<f64>> = Track::new(moments.len());
     let mut poses: Track<Pose> = Track::new(moments.len());
     for sample in &states.samples {
@@ -62,22 +61,14 @@ pub(super) fn whereabouts(moments: impl Iterator<Item = i64>, states: &Recording
     (Whereabouts { moments, joints, poses }, spans)
 }
 
-fn nanoseconds(seconds: f64) -> i64 {
-    (seconds * 1e9) as i64
-}
-
 /// How far apart the joints are, and the tip poses, that a sample lies between [ns]; `None` where it does not.
 type Gaps = [Option<i64>; 2];
 
 /// First and last time at which something was read [ns].
-type Span = Option<[i64; 2]>;
+pub(super) type Span = Option<[i64; 2]>;
 
 fn gap<T>(found: &Option<At<T>>) -> Option<i64> {
     found.as_ref().map(|at| at.gap)
-}
-
-fn seconds(nanoseconds: i64) -> f64 {
-    nanoseconds as f64 / 1e9
 }
 
 /// Says how many images were taken while nothing was read. Errors: where all were.

@@ -14,6 +14,16 @@ pub(crate) const LATEST: f64 = 1e10;
 /// The years 2000 to 2100 [s since 1970]: a number of a thousand times as many or more is not between them in any unit but its own.
 const DATES: std::ops::Range<f64> = 946_684_800.0..4_102_444_800.0;
 
+/// A time as it is counted inside [ns].
+pub(super) fn nanoseconds(seconds: f64) -> i64 {
+    (seconds * 1e9) as i64
+}
+
+/// A time as recordings and messages tell it [s].
+pub(super) fn seconds(nanoseconds: i64) -> f64 {
+    nanoseconds as f64 / 1e9
+}
+
 /// The unit in which a number is a date since 1970: its name and its seconds.
 pub(crate) fn unit_of_date(number: f64) -> Option<(&'static str, f64)> {
     UNITS.iter().find(|(_, _, seconds)| DATES.contains(&(number * seconds))).map(|(name, _, seconds)| (*name, *seconds))

@@ -1,4 +1,5 @@
 //! Images of several cameras at the same time as one sample.
+use super::clock::seconds;
 use super::names::Names;
 use super::{Detection, Sample};
 use handeye_solvers::Pose;
@@ -130,7 +131,7 @@ pub(super) fn samples(
         pixels.sort_by_key(|detection| (detection.camera, detection.feature));
         pixels.dedup_by_key(|detection| (detection.camera, detection.feature));
         twice += number - pixels.len();
-        Sample { time: Some(group.time as f64 / 1e9), joints, pose, pixels, ..Sample::default() }
+        Sample { time: Some(seconds(group.time)), joints, pose, pixels, ..Sample::default() }
     };
     let samples = groups.iter().zip(states).map(&mut sample).collect();
     (samples, features.list, twice)

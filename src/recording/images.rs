@@ -1,5 +1,7 @@
 //! What images show, with where the robot was at the time.
+use super::actions::take_actions;
 use super::at_times::{Moment, at_times, whereabouts};
+use super::clock::nanoseconds;
 use super::groups::{Group, Image, groups, moments, samples, split};
 use super::names::Names;
 use super::whereabouts::note_on_apart;
@@ -69,29 +71,36 @@ impl Recording {
         let camera_of_source: Vec<u32> = (0..cameras.len() as u32).collect();
         let groups = groups(&stamped, &camera_of_source, (!by_time).then_some(0));
         let mut notes = Vec::new();
-        let (groups, apart) = match rows.filter(|rows| rows.pairing == Pairing::Time) {
+        let (groups, at) = match rows.filter(|_| by_time) {
             Some(Rows { states, .. }) => {
-                let (whereabouts, _) = whereabouts(moments(&groups, &stamped).into_iter(), states);
-                split(groups, &stamped, |first, last| whereabouts.moved(first, last))
+                let (whereabouts, spans) = whereabouts(moments(&groups, &stamped), states);
+                let (groups, apart) = split(groups, &stamped, |first, last| whereabouts.moved(first, last));
+                notes.extend(note_on_apart(apart));
+                let whereabouts = whereabouts.of(&groups);
+                (groups, Some((whereabouts, spans)))
             }
-            None => (groups, 0),
+            None => (groups, None),
         };
-        notes.extend(note_on_apart(apart));
         let blank = images.iter().filter(|image| image.features.is_empty()).count();
         if blank > 0 {
             notes.push(format!("{blank} of {} images show nothing of what is looked for", images.len()));
         }
-        let found = match rows {
-            None => groups.iter().map(|_| Sample::default()).collect(),
-            Some(Rows { states, pairing: Pairing::Order, .. }) => {
-                taken(&in_order(&groups, order.len(), states)?, states, &mut notes)
-            }
-            Some(Rows { states, names, pairing: Pairing::Name }) => {
-                taken(&by_name(&groups, &order, states, names)?, states, &mut notes)
-            }
-            Some(Rows { states, pairing: Pairing::Time, .. }) => {
+        let found = match (rows, at) {
+            (None, _) => groups.iter().map(|_| Sample::default()).collect(),
+            (Some(Rows { states, .. }), Some((whereabouts, spans))) => {
                 let moment = |group: &Group| Moment { name: &images[group.images[0]].name, time: group.time };
-                at_times(&groups.iter().map(moment).collect::<Vec<_>>(), states, &mut notes)?
+                let moments: Vec<Moment> = groups.iter().map(moment).collect();
+                at_times(&moments, whereabouts, spans, states, &mut notes)?
+            }
+            (Some(Rows { states, names, pairing }), None) => {
+                let rows = match pairing {
+                    Pairing::Name => by_name(&groups, &order, states, names)?,
+                    _ => in_order(&groups, order.len(), states)?,
+                };
+                let mut samples: Vec<Sample> = rows.iter().map(|row| states.samples[*row].clone()).collect();
+                let rows: Vec<Option<usize>> = rows.into_iter().map(Some).collect();
+                take_actions(&mut samples, &rows, states, pairing, &mut notes);
+                samples
             }
         };
         let states = found.iter().map(|_| (None, None));
@@ -126,7 +135,7 @@ fn times(images: &[ImageSeen]) -> Result<Vec<i64>, String> {
             let name = &image.name;
             format!("the name of image `{name}` is no time, in seconds or as a count of ms, µs or ns since 1970 as all others are; by order or name they might pair")
         })?;
-        Ok((seconds * 1e9) as i64)
+        Ok(nanoseconds(seconds))
     };
     images.iter().map(time).collect()
 }
@@ -164,34 +173,4 @@ fn by_name(groups: &[Group], order: &[&str], states: &Recording, names: &[String
         rows.get(name).copied().ok_or_else(|| format!("no row is of the image `{name}`"))
     };
     groups.iter().map(row).collect()
-}
-
-/// These rows. What is commanded in one leads to the next row, which has to come next.
-fn taken(rows: &[usize], states: &Recording, notes: &mut Vec<String>) -> Vec<Sample> {
-    let leads = |index: usize| rows.get(index + 1) == Some(&(rows[index] + 1));
-    let mut samples: Vec<Sample> = rows.iter().map(|row| states.samples[*row].clone()).collect();
-    keep_actions(&mut samples, leads, states, notes);
-    samples
-}
-
-/// Keeps what is commanded in samples of which it leads to the next.
-pub(super) fn keep_actions(
-    samples: &mut [Sample],
-    leads: impl Fn(usize) -> bool,
-    states: &Recording,
-    notes: &mut Vec<String>,
-) {
-    for (_, sample) in samples.iter_mut().enumerate().filter(|(index, _)| !leads(*index)) {
-        (sample.joint_action, sample.pose_action) = (None, None);
-    }
-    let count = |samples: &[Sample]| {
-        samples.iter().filter(|sample| sample.joint_action.is_some() || sample.pose_action.is_some()).count()
-    };
-    let (kept, all) = (count(samples), count(&states.samples));
-    if kept < all {
-        let lost = all - kept;
-        notes.push(format!(
-            "{lost} of {all} commanded motions are left out: they lead from one row to the next, to which no next image belongs"
-        ));
-    }
 }

@@ -1,5 +1,6 @@
 //! Several recordings of one rig as one.
 use super::names::{Names, natural_order};
+use super::same_joints::are_those;
 use super::{RecordedCamera, Recording, Sample};
 use crate::Error;
 use std::path::{Path, PathBuf};
@@ -7,7 +8,8 @@ use std::path::{Path, PathBuf};
 impl Recording {
     /// Reads several recordings of the same rig and joins them in this order.
     ///
-    /// All must name the same joints, and may not contradict one another about a camera. What was commanded in the last
+    /// All must name the same joints in one order, apart from a prefix or suffix of all of them, and may not contradict one another about a camera.
+    /// Joints are called as in the first file. What was commanded in the last
     /// sample of a file does not lead to the first of the next, so it is dropped.
     ///
     /// Errors: those of [`Recording::read`], and [`Error::Unusable`] where two files do not fit together or none is given.
@@ -27,15 +29,13 @@ impl Recording {
         // The file from which each camera is known.
         let mut sources = vec![first; joined.cameras.len()];
         for path in others {
-            let next = read(path)?;
+            let mut next = read(path)?;
             if next.joints != joined.joints {
-                return Err(Error::Unusable(format!(
-                    "{} and {} are of different robots: joints {:?} and {:?}",
-                    first.display(),
-                    path.display(),
-                    joined.joints,
-                    next.joints
-                )));
+                if !are_those(&joined.joints, &next.joints) {
+                    let files = format!("{} and {}", first.display(), path.display());
+                    return Err(Error::Unusable(format!("{files} {}", other_joints(&joined.joints, &next.joints))));
+                }
+                next.joints.clone_from(&joined.joints);
             }
             for camera in &next.cameras {
                 match joined.cameras.iter().position(|known| known.name == camera.name) {
@@ -93,6 +93,18 @@ impl Recording {
         self.cameras[index] = self.cameras[index].over(camera);
         index as u32
     }
+}
+
+/// How the joints of two files differ, and what would do.
+fn other_joints(first: &[String], next: &[String]) -> String {
+    let common: Vec<&str> = first.iter().filter(|joint| next.contains(joint)).map(String::as_str).collect();
+    let [ours, theirs] = [first, next].map(|joints| if joints.is_empty() { "none".to_owned() } else { joints.join(", ") });
+    let would_do = match common[..] {
+        _ if first.is_empty() || next.is_empty() => String::new(),
+        [] => "; where they are of one robot, its joints need the same names in both".to_owned(),
+        _ => format!("; --joints {} takes those that both have", common.join(",")),
+    };
+    format!("are of different robots: joints {ours} and {theirs}{would_do}")
 }
 
 impl Sample {

@@ -1,10 +1,12 @@
 //! Recordings: what was commanded, read and seen; one file per format.
+mod actions;
 mod at_times;
 mod bag;
 mod checked;
 mod clock;
 mod command;
 mod describe;
+mod effect;
 mod groups;
 mod images;
 mod join;
@@ -23,6 +25,7 @@ pub use bag::{BagOptions, Detect, Found};
 pub(crate) use clock::{LATEST, are_far_apart, unit_of_date};
 pub use command::Command;
 pub(crate) use describe::px;
+pub use effect::WithoutEffect;
 pub use images::{ImageSeen, Pairing, Rows};
 pub use jsonl::Reader;
 pub(crate) use names::natural_order;

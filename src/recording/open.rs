@@ -38,11 +38,10 @@ impl Format {
     }
 }
 
-/// What of a file is meant, where it alone does not tell. Options of one format are nothing to the others, and none but
-/// `known_joints` and `cameras` is anything to JSON Lines.
+/// What of a file is meant, where it alone does not tell. Options of one format are nothing to the others, see [`OpenOptions::without_effect`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct OpenOptions {
-    /// Names of the joints from base to tip, some of those in the file; empty: `known_joints`, or all in the order of the file's columns or of
+    /// Names of the joints from base to tip, some of those in the file; empty: `known_joints`, or all in the order of the file's header or of
     /// the first joint state that has most.
     pub joints: Vec<String>,
     /// Names that the joints have where the file has all of them, as those of a rig: others are left out, as those of a gripper.
@@ -76,14 +75,19 @@ impl Recording {
         opened.with_cameras(&path.display().to_string(), options)
     }
 
-    /// Reads several recordings as [`Recording::open_with`] does and joins them as [`Recording::read_all`] does. What the options say of a camera is
-    /// said of it in every file that has it, and each note begins with its file.
+    /// Reads several recordings as [`Recording::open_with`] does and joins them as [`Recording::read_all`] does. The joints of the first are those
+    /// that are known in the others, which may have them in another order and beside more. What the options say of a camera is said of it in every
+    /// file that has it, and each note begins with its file.
     ///
     /// Errors: those of both.
     pub fn open_all(paths: &[PathBuf], options: &OpenOptions) -> Result<Opened, Error> {
         let mut all_notes = Vec::new();
+        let mut of_file = options.clone();
         let recording = Recording::read_all_with(paths, &mut |path| {
-            let Opened { recording, notes, .. } = open(path, options)?;
+            let Opened { recording, notes, .. } = open(path, &of_file)?;
+            if !recording.joints.is_empty() {
+                of_file.known_joints.clone_from(&recording.joints);
+            }
             all_notes.extend(notes.iter().map(|note| format!("{}: {note}", path.display())));
             Ok(recording)
         })?;
@@ -108,7 +112,7 @@ fn open(path: &Path, options: &OpenOptions) -> Result<Opened, Error> {
             let described = recording.describe_those_there(&options.cameras);
             let unusable = |problem: String| Error::Unusable(format!("{}: {problem}", path.display()));
             described.map_err(unusable)?;
-            let notes = recording.take_joints(&options.known_joints).map_err(unusable)?;
+            let notes = recording.take_joints(options).map_err(unusable)?;
             Ok(Opened { recording, notes, images: Vec::new() })
         }
         Format::Bag => bag::read(path, options, None),

@@ -46,9 +46,10 @@ pub(super) fn are_those(rig: &[String], recording: &[String]) -> bool {
     matches!(places(rig, recording), Places::Found(places) if places.iter().copied().eq(0..recording.len()))
 }
 
-/// What has to be said where a rig's joints are there more than once; `first`: what its first joint may be.
+/// What has to be said where joints that are known are there more than once; `first`: what the first of them may be.
 pub(super) fn several(first: &[String]) -> String {
-    format!("several joints may be the rig's, whose first would be {}", first.join(" or "))
+    let first = first.join(" or ");
+    format!("several joints may be meant, whose first would be {first}: --joints names those of one robot")
 }
 
 /// What stands before and after a name wherever another holds it as whole words.

@@ -12,8 +12,8 @@ pub(super) struct Whereabouts {
     pub poses: Vec<Option<At<Pose>>>,
 }
 
-/// A robot that moves by less between two images stands still [rad, m]: a tenth of a pixel or so.
-const STILL: f64 = 2e-4;
+/// Motion between two images that is seen in them [rad, m]: what is less is a tenth of a pixel or so.
+const SEEN: f64 = 2e-4;
 
 impl Whereabouts {
     /// True where it moved between two of the moments.
@@ -21,11 +21,11 @@ impl Whereabouts {
         let place = |time: i64| self.moments.binary_search(&time).ok();
         let (Some(first), Some(last)) = (place(first), place(last)) else { return false };
         let turned = |(one, other): (&At<Vec<f64>>, &At<Vec<f64>>)| {
-            one.value.iter().zip(&other.value).any(|(one, other)| (one - other).abs() > STILL)
+            one.value.iter().zip(&other.value).any(|(one, other)| (one - other).abs() > SEEN)
         };
         let carried = |(one, other): (&At<Pose>, &At<Pose>)| {
             let shift = other.value.translation - one.value.translation;
-            one.value.angle_to(&other.value) > STILL || shift.norm() > STILL
+            one.value.angle_to(&other.value) > SEEN || shift.norm() > SEEN
         };
         self.joints[first].as_ref().zip(self.joints[last].as_ref()).is_some_and(turned)
             || self.poses[first].as_ref().zip(self.poses[last].as_ref()).is_some_and(carried)
@@ -48,7 +48,7 @@ pub(super) fn note_on_apart(apart: usize) -> Option<String> {
     (apart > 0).then(|| {
         format!(
             "{apart} times the robot moved by more than {} mrad or mm from one camera's image to the next, or its readings are as noisy, so that each is a sample of its own, with the joints of its own time",
-            1e3 * STILL
+            1e3 * SEEN
         )
     })
 }

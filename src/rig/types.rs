@@ -41,6 +41,13 @@ pub struct Robot {
     pub joints: Vec<Joint>,
 }
 
+impl Robot {
+    /// Names of the joints, from base to tip.
+    pub fn joint_names(&self) -> Vec<String> {
+        self.joints.iter().map(|joint| joint.name.clone()).collect()
+    }
+}
+
 /// One joint and the link behind it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Joint {

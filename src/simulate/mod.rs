@@ -124,7 +124,7 @@ fn record(rig: &Rig, model: &Model, views: &Views<'_>, positions: Vec<Vec<f64>>)
         sample
     };
     Recording {
-        joints: rig.robot.joints.iter().map(|joint| joint.name.clone()).collect(),
+        joints: rig.robot.joint_names(),
         cameras: rig.cameras.iter().map(RecordedCamera::from).collect(),
         features,
         samples: (0..positions.len()).map(sample).collect(),

@@ -178,7 +178,7 @@ fn images_pair_with_rows_by_order_or_time_and_mistakes_are_named() {
     fails("shots --pattern checkerboard=9", &["checkerboard=COLUMNSxROWS"]);
     fails("shots --pattern charuco=20x20:DICT_4X4_50:0.7", &["needs 200 tags, and DICT_4X4_50 has 50"]);
     fails("nowhere --pattern tag36h11", &["nowhere"]);
-    fails("shots --pattern tag36h11 --join 0.1", &["no bag and no table is read, where --join has no effect"]);
+    fails("shots --pattern tag36h11 --join 0.1", &["no recording is read, where --join has no effect"]);
     fails("left=shots --pattern tag36h11", &["shots: has no images"]);
     fails("shots --pattern tag36h11 --states rows.csv --pair name", &["rows.csv", "a column `image`"]);
     fails("shots --pattern tag36h11 --camera top=1x1", &["--camera: there are no images of a camera `top`"]);

@@ -29,7 +29,7 @@ pub(super) fn stand_in(learned: &Rig, fit: &Fit, seed: u64) -> Result<Data<'stat
     let mut motions = Motions::new(learned, &views, ranges, stream(seed, STAND_IN));
     let samples = fit.samples.clamp(1, MOST);
     let mut recording = Recording {
-        joints: learned.robot.joints.iter().map(|joint| joint.name.clone()).collect(),
+        joints: learned.robot.joint_names(),
         cameras: learned.cameras.iter().map(RecordedCamera::from).collect(),
         features: learned.features.iter().map(|feature| feature.name.clone()).collect(),
         samples: Vec::new(),

@@ -7,6 +7,7 @@ use super::messages::{Channel, Visitor};
 use super::topics::{Topic, is_topic};
 use super::{BagOptions, Detect, Found};
 use crate::Error;
+use crate::recording::clock::seconds;
 use crate::recording::groups::Image;
 use crate::recording::px;
 use std::collections::BTreeMap;
@@ -90,7 +91,7 @@ impl<'a> Images<'a> {
                     let known = *self.sizes.entry(*source).or_insert(size);
                     if known != size {
                         let (file, topic) = (self.path.display(), &self.topics[self.sources[*source].0].name);
-                        let seconds = *stamp as f64 / 1e9;
+                        let seconds = seconds(*stamp);
                         return Err(Error::Unusable(format!(
                             "{file}: {topic}: the image of {seconds:.6} s is of {}, and those before are of {}",
                             px(size),

@@ -70,7 +70,7 @@ impl JointLists {
         if options.joints.is_empty() {
             let names = self.names(topic);
             return match places(&options.known_joints, &names) {
-                Places::Several(first) => Err(format!("{}: --joints names those that are meant", several(&first))),
+                Places::Several(first) => Err(several(&first)),
                 Places::Found(places) => {
                     let found: Vec<String> = places.into_iter().map(|place| names[place].clone()).collect();
                     Ok(if has_all(&found) { found } else { longest.names.clone() })

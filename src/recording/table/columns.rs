@@ -201,9 +201,7 @@ impl Columns {
         let names = match places(known, &in_groups) {
             _ if !joints.is_empty() => joints.to_vec(),
             Places::Found(places) => places.into_iter().map(|place| in_groups[place].clone()).collect(),
-            Places::Several(first) => {
-                return Err((0, format!("{}: --joints names those that are meant", several(&first))));
-            }
+            Places::Several(first) => return Err((0, several(&first))),
             // Other columns are joints where they are called just as the rig calls its own.
             Places::Missing if !known.is_empty() && all(known).is_some() => known.to_vec(),
             Places::Missing => in_groups,

@@ -138,7 +138,7 @@ impl World {
             sizes: sizes(rig)?,
             depth: rig.cameras.iter().map(|camera| camera.depth).collect(),
             header: Recording {
-                joints: rig.robot.joints.iter().map(|joint| joint.name.clone()).collect(),
+                joints: rig.robot.joint_names(),
                 cameras: rig.cameras.iter().map(RecordedCamera::from).collect(),
                 features,
                 samples: Vec::new(),
