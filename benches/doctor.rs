@@ -26,15 +26,15 @@ fn main() {
     table("joints and pixels, random rig", &faults::of_joints(), trials, &|seed| {
         by_joints(&random_rig(6, 2, 12, seed), seed)
     });
+    table("joints and pixels, the chain of a UR5", &faults::of_ur_arms(), trials, &faults::ur5);
     table("joints and pixels, a random rig on the move", &faults::of_dense_motion(), trials, &faults::dense_motion);
     if let Some((rig, recording)) = ur3e() {
         let tips = tips_in_place_of_joints(&rig, &recording);
         table("ur3e-checkerboard, 25 tip poses of it", &faults::of_tips(), trials, &|seed| {
             (tips.0.clone(), part(&tips.1, seed))
         });
-        table("ur3e-checkerboard, 25 samples of it", &faults::of_joints(), trials, &|seed| {
-            (rig.clone(), part(&recording, seed))
-        });
+        let of_arm: Vec<Fault> = faults::of_joints().into_iter().chain(faults::of_ur_arms()).collect();
+        table("ur3e-checkerboard, 25 samples of it", &of_arm, trials, &|seed| (rig.clone(), part(&recording, seed)));
     }
 }
 

@@ -1,6 +1,6 @@
 //! Mistakes planted in recordings, and what the doctor has to say of each.
 use handeye::recording::{Detection, RecordedCamera, Recording, Sample, TargetDetection};
-use handeye::rig::{Camera, Feature, Model, Parent, Rig};
+use handeye::rig::{Camera, Feature, Model, Parent, Rig, catalog};
 use handeye::simulate::{SimulateOptions, random_rig, simulate};
 use handeye::solvers::Pose;
 use handeye::solvers::manifold::so3;
@@ -64,6 +64,19 @@ pub fn of_joints() -> Vec<Fault> {
                 let last = joints.len() - 1;
                 joints[..last].copy_from_slice(&first[..last]);
             }
+        }),
+    ]
+}
+
+/// Mistakes of recordings of a UR arm whose chain the rig gives: the alphabetical order of some of its drivers, and wrist joints that are exchanged.
+pub fn of_ur_arms() -> Vec<Fault> {
+    let fault = |name, says, plant| Fault { name, says, plant };
+    vec![
+        fault("joints in alphabetical order", "joints shoulder_pan and elbow are swapped", |_, recording| {
+            recording.samples.iter_mut().flat_map(|sample| &mut sample.joints).for_each(|joints| joints.swap(0, 2));
+        }),
+        fault("wrist joints swapped", "joints wrist_1 and wrist_3 are swapped", |_, recording| {
+            recording.samples.iter_mut().flat_map(|sample| &mut sample.joints).for_each(|joints| joints.swap(3, 5));
         }),
     ]
 }
@@ -185,6 +198,15 @@ fn lag(recording: &mut Recording, seconds: f64) {
         let read = sample.time.unwrap_or_default() - seconds;
         samples[0].time <= Some(read) && Some(read) <= samples[samples.len() - 1].time
     });
+}
+
+/// A UR5 with noise on its pixels, of which the chain and the intrinsics are known.
+pub fn ur5(seed: u64) -> (Rig, Recording) {
+    let rig = catalog::rig("ur5").expect("it is shipped");
+    let options = SimulateOptions { samples: 25, seed, ..SimulateOptions::default() };
+    let recording = simulate(&rig, &options).expect("the rig is in view").recording;
+    let noise = rig.noise.clone();
+    (Rig { robot: rig.robot, noise, ..Rig::default() }, recording)
 }
 
 /// A random rig's arm on its way through random positions, ten images a second with 0.3 px of noise; nothing known but intrinsics.

@@ -4,6 +4,9 @@ use crate::chain::JointKind;
 use crate::recording::Recording;
 use crate::rig::{Camera, Feature, Parent, Rig};
 
+/// How joints in degrees are called, and what to change.
+pub(super) const DEGREES: (&str, &str) = ("joints are in degrees", "divide the readings of revolute joints by 57.2958");
+
 /// The data with one mistake undone.
 pub(super) struct Alternative {
     pub about: About,
@@ -45,6 +48,12 @@ pub(super) fn all(rig: &Rig, recording: &Recording) -> Vec<Alternative> {
             ..as_recorded(About::Order, &name, &change)
         });
     }
+    for (name, change, order) in undo::joint_orders(rig, recording) {
+        all.push(Alternative {
+            recording: undo::reordered(recording, &order),
+            ..as_recorded(About::Joints, &name, &change)
+        });
+    }
     all.extend(other_side(rig, recording).map(|(rig, declared, parent)| {
         let name = format!("cameras that are declared {declared} move as if they were not");
         let change = format!("set the parent of the cameras to \"{parent}\", and that of the features to the other");
@@ -61,8 +70,7 @@ fn units(rig: &Rig, as_recorded: impl Fn(About, &str, &str) -> Alternative) -> V
         }
         alternative
     };
-    let degrees =
-        as_recorded(About::Units, "joints are in degrees", "divide the readings of revolute joints by 57.2958");
+    let degrees = as_recorded(About::Units, DEGREES.0, DEGREES.1);
     let mut all = vec![scaled(degrees, JointKind::Revolute, 1f64.to_radians())];
     if rig.robot.joints.iter().any(|joint| joint.kind == JointKind::Prismatic) {
         let lengths = as_recorded(

@@ -64,6 +64,8 @@ pub enum About {
     Turns,
     /// How rows go with images and with one another, and how poses, pixels and cameras are written.
     Order,
+    /// Which reading is of which joint.
+    Joints,
 }
 
 /// A mistake in the data, or something that they lack.
@@ -115,16 +117,16 @@ pub fn examine_watched(
     let turns_freely = !diagnosis.findings.iter().any(|finding| finding.about == About::Turns);
     if let Some(pairs) = poses::Pairs::new(rig, recording, &tips).filter(|_| turns_freely) {
         let has_poses = recording.samples.iter().any(|sample| sample.pose.is_some());
-        let in_degrees = (!has_poses).then(|| self::tips(rig, recording, |reading| reading.to_radians()));
-        pairs.examine(in_degrees.as_deref(), &mut diagnosis.scores, &mut diagnosis.findings);
+        let other_tips = if has_poses { Vec::new() } else { other_tips(rig, recording) };
+        pairs.examine(&other_tips, &mut diagnosis.scores, &mut diagnosis.findings);
     }
     let is_seen = |sample: &crate::recording::Sample| !sample.pixels.is_empty() || !sample.points.is_empty();
     let is_read = |sample: &crate::recording::Sample| sample.joints.is_some() || sample.pose.is_some();
     if recording.samples.iter().any(|sample| is_seen(sample) && is_read(sample)) {
         pixels::examine(rig, recording, options, &mut diagnosis, watch);
     }
-    // Readings in a wrong unit are outside of limits too.
-    if diagnosis.findings.iter().any(|finding| finding.about == About::Units) {
+    // Readings in a wrong unit, or of another joint, are outside of limits too.
+    if diagnosis.findings.iter().any(|finding| matches!(finding.about, About::Units | About::Joints)) {
         diagnosis.findings.retain(|finding| finding.about != About::Limits);
     }
     let mut known: Vec<Finding> = Vec::new();
@@ -141,15 +143,34 @@ pub fn examine_watched(
 ///
 /// `angle` makes radians of the reading of a revolute joint.
 fn tips(rig: &Rig, recording: &Recording, angle: impl Fn(&f64) -> f64) -> Vec<Option<Pose>> {
-    let arm = Rig { cameras: Vec::new(), features: Vec::new(), targets: Vec::new(), ..rig.clone() };
-    let n_joints = recording.joints.len();
-    let model = Model::new(&arm).ok().filter(|model| n_joints > 0 && model.chain.len() == n_joints);
+    let model = arm(rig, recording);
     let by_joints = |joints: &Vec<f64>| {
         let kinds = rig.robot.joints.iter().map(|joint| joint.kind);
         let read = |(reading, kind)| if kind == JointKind::Revolute { angle(reading) } else { *reading };
         model.as_ref().map(|model| model.tip(&joints.iter().zip(kinds).map(read).collect::<Vec<f64>>()))
     };
     recording.samples.iter().map(|sample| sample.pose.or_else(|| by_joints(sample.joints.as_ref()?))).collect()
+}
+
+/// The rig's chain, where it gives one of as many joints as were recorded.
+fn arm(rig: &Rig, recording: &Recording) -> Option<Model> {
+    let arm = Rig { cameras: Vec::new(), features: Vec::new(), targets: Vec::new(), ..rig.clone() };
+    let n_joints = recording.joints.len();
+    Model::new(&arm).ok().filter(|model| n_joints > 0 && model.chain.len() == n_joints)
+}
+
+/// A reading of joints: what it is about, how it is called, what to change, and the tips that it leads to.
+type OtherTips = (About, String, String, Vec<Option<Pose>>);
+
+/// Readings of the joints of a chain that is known beside the one that was recorded.
+fn other_tips(rig: &Rig, recording: &Recording) -> Vec<OtherTips> {
+    let (name, change) = alternatives::DEGREES;
+    let in_degrees = tips(rig, recording, |reading| reading.to_radians());
+    let orders = undo::joint_orders(rig, recording).into_iter().map(|(name, change, order)| {
+        let tips = tips(rig, &undo::reordered(recording, &order), f64::to_owned);
+        (About::Joints, name, change, tips)
+    });
+    [(About::Units, name.to_owned(), change.to_owned(), in_degrees)].into_iter().chain(orders).collect()
 }
 
 /// True where the misfit is far below that of the data as recorded, or where only it could be had.

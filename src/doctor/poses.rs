@@ -1,6 +1,6 @@
 //! Robot and targets as two motions: which reading of them agrees with a rigid camera and a rigid target (a X = Z b).
 use super::undo;
-use super::{About, Finding, Misfit, Score, is_clearly_better};
+use super::{About, Finding, Misfit, OtherTips, Score, is_clearly_better};
 use crate::calibrate::median;
 use crate::geometry::robot_world;
 use crate::recording::Recording;
@@ -76,8 +76,8 @@ impl Pairs {
         (pairs.samples.len() >= FEWEST).then_some(pairs)
     }
 
-    /// Scores every reading of the pairs. `in_degrees`: tips from joints read as degrees, where joints are what is known.
-    pub fn examine(&self, in_degrees: Option<&[Option<Pose>]>, scores: &mut Vec<Score>, findings: &mut Vec<Finding>) {
+    /// Scores every reading of the pairs. `other_tips`: tips from joints that are read otherwise, where joints are what is known.
+    pub fn examine(&self, other_tips: &[OtherTips], scores: &mut Vec<Score>, findings: &mut Vec<Finding>) {
         let reading = |about: About, name: &str, change: &str| Reading {
             about,
             name: name.to_owned(),
@@ -90,7 +90,7 @@ impl Pairs {
         let as_recorded = recorded.as_ref().map(|fit| fit.misfit);
         scores.push(Score { alternative: "as recorded".into(), misfit: as_recorded });
         let mut best: Option<(Misfit, Reading, Fit)> = None;
-        for alternative in self.alternatives(in_degrees, &reading) {
+        for alternative in self.alternatives(other_tips, &reading) {
             let fit = alternative.fit();
             // The three obey one equation.
             let others = ["target poses are inverted", "the camera is on the other side of the robot"];
@@ -112,11 +112,7 @@ impl Pairs {
         }
     }
 
-    fn alternatives(
-        &self,
-        in_degrees: Option<&[Option<Pose>]>,
-        reading: &impl Fn(About, &str, &str) -> Reading,
-    ) -> Vec<Reading> {
+    fn alternatives(&self, other_tips: &[OtherTips], reading: &impl Fn(About, &str, &str) -> Reading) -> Vec<Reading> {
         let mut all = Vec::new();
         for (about, name, change, undo) in undo::OF_POSES {
             let robot = self.robot.iter().map(undo).collect();
@@ -126,12 +122,9 @@ impl Pairs {
             let target = self.target.iter().map(undo).collect();
             all.push(Reading { target, ..reading(about, &format!("target poses are {name}"), change) });
         }
-        if let Some(tips) = in_degrees {
+        for (about, name, change, tips) in other_tips {
             let robot = self.samples.iter().map(|sample| tips[*sample].unwrap_or_else(Pose::identity)).collect();
-            all.push(Reading {
-                robot,
-                ..reading(About::Units, "joints are in degrees", "divide the readings of revolute joints by 57.2958")
-            });
+            all.push(Reading { robot, ..reading(*about, name, change) });
         }
         for (name, change, rows) in undo::pairings("robot poses", self.samples.len()) {
             let of = |poses: &[Pose], index: &dyn Fn(usize) -> Option<usize>| -> Vec<Pose> {

@@ -1,6 +1,8 @@
-//! Mistakes of whole recordings, undone: poses that are inverted or written otherwise, rows that belong to other samples.
-use super::About;
-use crate::recording::{Recording, Sample};
+//! Mistakes of whole recordings, undone: poses that are inverted or written otherwise, rows that belong to other samples, readings that belong to
+//! other joints.
+use super::{About, arm};
+use crate::recording::{Recording, Sample, is_in_another_order};
+use crate::rig::Rig;
 use handeye_solvers::Pose;
 use handeye_solvers::manifold::so3;
 
@@ -55,4 +57,44 @@ pub(super) fn paired(recording: &Recording, rows: &[Option<usize>]) -> Recording
         Some(Sample { joints: read.joints.clone(), pose: read.pose, ..sample.clone() })
     });
     Recording { samples: samples.collect(), ..recording.clone() }
+}
+
+/// Arms of more joints have too many pairs to try.
+const MOST_JOINTS: usize = 8;
+
+/// How readings may be of other joints than those at whose places they stand: how it is called, what to change, and for each joint the place of its
+/// reading.
+type JointOrder = (String, String, Vec<usize>);
+
+/// Any two joints in each other's place, where the rig gives the chain: one that is learned says nothing of the joints' order.
+pub(super) fn joint_orders(rig: &Rig, recording: &Recording) -> Vec<JointOrder> {
+    let n = recording.joints.len();
+    if n > MOST_JOINTS || arm(rig, recording).is_none() {
+        return Vec::new();
+    }
+    let of_rig = rig.robot.joint_names();
+    let swapped = |i: usize, j: usize| {
+        let mut order: Vec<usize> = (0..n).collect();
+        order.swap(i, j);
+        let names: Vec<String> = order.iter().map(|place| recording.joints[*place].clone()).collect();
+        let [a, b] = [i, j].map(|place| &recording.joints[place]);
+        let change = if is_in_another_order(&names, &of_rig) {
+            format!("what is called {a} is {b}, and the other way round: exchange their names, or their readings")
+        } else {
+            format!("from base to tip they are {}: --joints {} reads them so", names.join(", "), names.join(","))
+        };
+        (format!("joints {a} and {b} are swapped"), change, order)
+    };
+    (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j))).map(|(i, j)| swapped(i, j)).collect()
+}
+
+/// The recording with the readings, and commanded motions, of joints at other places.
+pub(super) fn reordered(recording: &Recording, order: &[usize]) -> Recording {
+    let mut reordered = recording.clone();
+    for joints in
+        reordered.samples.iter_mut().flat_map(|sample| [&mut sample.joints, &mut sample.joint_action]).flatten()
+    {
+        *joints = order.iter().map(|place| joints[*place]).collect();
+    }
+    reordered
 }

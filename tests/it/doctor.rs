@@ -6,9 +6,11 @@ use crate::cli::Folder;
 use faults::Fault;
 use handeye::calibrate::Options;
 use handeye::doctor::{examine, examine_watched};
-use handeye::recording::Recording;
-use handeye::rig::{Limits, Rig, catalog};
+use handeye::recording::{Recording, TargetDetection};
+use handeye::rig::{Limits, Model, Rig, catalog};
 use handeye::simulate::{SimulateOptions, random_rig, simulate};
+use handeye::solvers::Pose;
+use nalgebra::Vector3;
 
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=5;
 
@@ -146,6 +148,61 @@ fn readings_outside_the_limits_of_the_rig_are_found_first() {
     let expected = format!("{beyond} of 20 readings of joint `{name}` are outside the rig's limits");
     let found = found(&rig, &recording);
     assert!(found.len() == 1 && found[0].starts_with(&expected), "{expected}: {found:?}");
+}
+
+/// As drivers have them that write joints by the alphabet, under names that are not the rig's and under those that are.
+#[test]
+fn two_joints_in_each_other_s_place_are_found_with_what_puts_them_right_and_none_are_in_clean_or_noisier_recordings() {
+    for seed in 1..=2 {
+        assert_eq!(found(&faults::ur5(seed).0, &faults::ur5(seed).1), Vec::<String>::new(), "seed {seed}");
+        faults::of_ur_arms().iter().for_each(|fault| is_found(fault, faults::ur5(seed), seed));
+    }
+    let (mut rig, mut recording) = faults::ur5(3);
+    rig.noise.pixels /= 10.0;
+    let noisy = examine(&rig, &recording, &Options::default());
+    let tried = noisy.scores.iter().filter(|score| score.alternative.ends_with("are swapped")).count();
+    assert_eq!((noisy.findings.len(), tried), (0, 15), "{noisy:?}");
+    (faults::of_ur_arms()[0].plant)(&mut rig, &mut recording);
+    let change = |recording: &Recording| {
+        let mut findings = examine(&rig, recording, &Options::default()).findings;
+        assert_eq!(findings.len(), 1, "{findings:?}");
+        findings.remove(0).change
+    };
+    let called_so = change(&recording);
+    assert!(called_so.starts_with("what is called shoulder_pan is elbow, and the other way round"), "{called_so}");
+    recording.joints = ["e", "l", "p", "w1", "w2", "w3"].map(str::to_owned).to_vec();
+    let otherwise = change(&recording);
+    assert!(otherwise.ends_with(": --joints p,l,e,w1,w2,w3 reads them so"), "{otherwise}");
+}
+
+/// A camera in the world that sees a target on the tip, which tells in closed form where the tip is.
+#[test]
+fn two_joints_in_each_other_s_place_are_found_by_poses_of_targets() {
+    for seed in SEEDS {
+        let (mut rig, mut recording) = faults::ur5(seed);
+        let model = Model::new(&rig).unwrap();
+        let [camera_from_world, tip_from_target] =
+            [[0.3, -0.2, 0.9], [0.05, 0.02, 0.1]].map(|xyz| Pose::new(Vector3::new(2.1, 0.4, -0.3), xyz.into()));
+        recording.features.clear();
+        for (index, sample) in recording.samples.iter_mut().enumerate() {
+            let [s, c] = [(97.0 * index as f64).sin(), (131.0 * index as f64).cos()];
+            let noise = Pose::new(1e-3 * Vector3::new(s, c, s * c), 5e-4 * Vector3::new(c, s * c, s));
+            let pose = camera_from_world * model.tip(sample.joints.as_ref().unwrap()) * tip_from_target * noise;
+            sample.pixels.clear();
+            sample.targets = vec![TargetDetection { camera: 0, target: "tag".into(), pose, covariance: None }];
+        }
+        assert_eq!(found(&rig, &recording), Vec::<String>::new(), "seed {seed}");
+        for fault in faults::of_ur_arms() {
+            is_found(&fault, (rig.clone(), recording.clone()), seed);
+        }
+        rig.robot.joints.clear();
+        (faults::of_ur_arms()[0].plant)(&mut rig, &mut recording);
+        let scores = examine(&rig, &recording, &Options::default()).scores;
+        assert!(
+            !scores.iter().any(|score| score.alternative.ends_with("are swapped")),
+            "no chain, no order: {scores:?}"
+        );
+    }
 }
 
 #[test]
