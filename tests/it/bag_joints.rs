@@ -140,7 +140,7 @@ fn states_of_an_arm_and_a_gripper_on_one_topic_are_told_apart_and_those_without_
         let [a, b] = sample.joints.as_ref().unwrap()[..] else { panic!() };
         assert!((a - seconds).abs() < 1e-9 && (b - 0.5 * seconds).abs() < 1e-9, "{a} {b} at {seconds}");
     }
-    assert!(notes.iter().any(|note| note.contains("10 joint states lack a joint or a position")), "{notes:?}");
+    assert!(notes.iter().any(|note| note.contains("10 of 20 joint states lack a joint or a position")), "{notes:?}");
 }
 
 /// Names within a driver's prefix and suffix, in the driver's order, as those of a rig's; of two arms neither is taken for the other.
@@ -170,7 +170,7 @@ fn joints_of_a_driver_are_those_of_the_rig_in_the_order_of_the_rig() {
     });
     let several = |messages: &[Message]| {
         let error = read_with(&images_beside(4, messages), &folder, &options).unwrap_err().to_string();
-        assert!(error.contains("left_a or right_a: --joints names those that are meant"), "{error}");
+        assert!(error.contains("left_a or right_a: --joints names those of one robot"), "{error}");
     };
     several(&both);
     // In turn on one topic, in either order.

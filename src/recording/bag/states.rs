@@ -30,7 +30,8 @@ pub(super) struct States<'a> {
     pub joints: Track<Vec<f64>>,
     pub poses: Track<Pose>,
     pub frames: Frames,
-    /// Joint states that lack a joint, or a number.
+    /// Joint states of the topic, and those that lack a joint, or a number.
+    pub seen: usize,
     pub skipped: usize,
 }
 
@@ -55,6 +56,7 @@ impl<'a> States<'a> {
             joints: Track::new(moments.len()),
             poses: Track::new(moments.len()),
             frames: Frames::default(),
+            seen: 0,
             skipped: 0,
         }
     }
@@ -92,6 +94,7 @@ impl Visitor for States<'_> {
             Kind::JointStates if is_from(self.joint_topic) => topic.decode(path, time, data, |message| {
                 let names = need(message.texts("name"), "name")?;
                 let positions = need(message.numbers("position"), "position")?;
+                self.seen += 1;
                 if self.read(names, positions)? {
                     self.joints.add(moments, stamp(message)?, &self.state);
                 } else {
