@@ -43,7 +43,8 @@ pub struct Convert {
 impl Convert {
     pub fn run(&self) -> Result<Answer, Error> {
         check_output(&self.output, std::slice::from_ref(&self.input))?;
-        let Opened { recording, notes, .. } = Recording::open_with(&self.input, &self.reading.options(&[&self.input])?)?;
+        let Opened { recording, notes, .. } =
+            Recording::open_with(&self.input, &self.reading.options(&[&self.input])?)?;
         recording.write(&self.output)?;
         Ok(written(&self.output, &recording, &notes))
     }

@@ -98,7 +98,8 @@ impl Recording {
 /// How the joints of two files differ, and what would do.
 fn other_joints(first: &[String], next: &[String]) -> String {
     let common: Vec<&str> = first.iter().filter(|joint| next.contains(joint)).map(String::as_str).collect();
-    let [ours, theirs] = [first, next].map(|joints| if joints.is_empty() { "none".to_owned() } else { joints.join(", ") });
+    let [ours, theirs] =
+        [first, next].map(|joints| if joints.is_empty() { "none".to_owned() } else { joints.join(", ") });
     let would_do = match common[..] {
         _ if first.is_empty() || next.is_empty() => String::new(),
         [] => "; where they are of one robot, its joints need the same names in both".to_owned(),

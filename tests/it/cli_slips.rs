@@ -68,7 +68,7 @@ fn joints_in_another_order_than_the_rigs_are_taken_by_their_names() {
     let (found, err) = folder.expect(0, "evaluate ur5 rotated.jsonl");
     assert_eq!(found, expected);
     assert!(
-        err.starts_with("note: rotated.jsonl: joints are taken by their names, in the order of the rig: "),
+        err.starts_with("note: rotated.jsonl: joints are taken by their names, in the order shoulder_pan, "),
         "{err}"
     );
     for command in ["infer ur5", "monitor ur5"] {

@@ -193,6 +193,55 @@ fn recordings_of_different_rigs_do_not_join_and_both_files_are_named() {
     assert!(matches!(Recording::read_all(&[]), Err(Error::Unusable(_))));
 }
 
+/// Two arms in one recording, of which a rig is one.
+#[test]
+fn joints_of_a_recording_are_chosen_and_ordered_by_name_as_those_of_a_table() {
+    let folder = Folder::new("chosen-joints");
+    let lines = header(r#"["left_a","left_b","right_a","right_b"]"#, "{}")
+        + "{\"joints\":[1,2,3,4],\"joint_action\":[0.1,0.2,0.3,0.4]}\n{\"joints\":[5,6,7,8]}\n";
+    let path = file(&folder, "two.jsonl", &lines);
+    let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<String>>();
+    let open = |joints: &[&str]| {
+        let options = OpenOptions { joints: names(joints), known_joints: names(&["a", "b"]), ..OpenOptions::default() };
+        Recording::open_with(&path, &options)
+    };
+    let Opened { recording, notes, .. } = open(&["right_b", "right_a"]).unwrap();
+    assert_eq!(recording.joints, ["right_b", "right_a"]);
+    assert_eq!(recording.samples[0].joints, Some(vec![4.0, 3.0]));
+    assert_eq!(recording.samples[0].joint_action, Some(vec![0.4, 0.3]));
+    assert_eq!(recording.samples[1].joints, Some(vec![8.0, 7.0]));
+    assert_eq!(notes, ["joints that are left out: left_a, left_b; those that are taken: right_b, right_a"]);
+    for (joints, says) in [
+        (
+            &[][..],
+            "two.jsonl: several joints may be meant, whose first would be left_a or right_a: --joints names those of one robot",
+        ),
+        (&["left_a", "left_c"], "two.jsonl: there is no joint `left_c`"),
+        (&["left_a", "left_a"], "two.jsonl: --joints names `left_a` twice"),
+    ] {
+        let error = open(joints).unwrap_err();
+        assert!(matches!(error, Error::Unusable(_)) && error.to_string().contains(says), "{says}: {error}");
+    }
+    folder.write("arm.toml", "[[robot.joints]]\nname = \"a\"\n[[robot.joints]]\nname = \"b\"\n");
+    folder.expect(2, "check arm.toml two.jsonl");
+    let (text, _) = folder.expect(0, "check arm.toml two.jsonl --joints left_a,left_b");
+    assert!(text.contains("joints that are left out: right_a, right_b"), "{text}");
+}
+
+#[test]
+fn files_of_one_robot_join_whatever_the_order_of_its_joints_and_what_is_beside_them() {
+    let folder = Folder::new("join-by-name");
+    let first = file(&folder, "1.jsonl", &(header(r#"["a","b"]"#, "{}") + "{\"joints\":[1,2]}\n"));
+    let next = file(&folder, "2.jsonl", &(header(r#"["finger","arm_b","arm_a"]"#, "{}") + "{\"joints\":[7,4,3]}\n"));
+    let Opened { recording, notes, .. } =
+        Recording::open_all(&[first.clone(), next.clone()], &OpenOptions::default()).unwrap();
+    assert_eq!(recording.joints, ["a", "b"]);
+    assert_eq!(recording.samples[1].joints, Some(vec![3.0, 4.0]));
+    assert!(notes.iter().any(|note| note.contains("2.jsonl: joints that are left out: finger")), "{notes:?}");
+    let error = Recording::open_all(&[next, first], &OpenOptions::default()).unwrap_err().to_string();
+    assert!(error.contains("joints finger, arm_b, arm_a and a, b; where they are of one robot"), "{error}");
+}
+
 #[test]
 fn what_cannot_be_read_back_is_not_written() {
     let folder = Folder::new("not-finite");
