@@ -44,7 +44,7 @@ pub(super) fn take_actions(
     for (lost, why) in [
         (of_none, format!("{has_image} their row")),
         (to_none, format!("{has_image} the row that they lead to")),
-        (to_other, "the next image is not of the row that they lead to".to_owned()),
+        (to_other, "the row that they lead to is not that of the next image".to_owned()),
     ] {
         if lost > 0 {
             notes.push(format!("{lost} of {all} commanded motions are left out: {why}"));

@@ -277,13 +277,22 @@ fn what_was_commanded_stays_where_it_leads_to_the_next_image_and_what_is_lost_is
         let actions: Vec<_> = samples.iter().map(|sample| sample.joint_action.clone()).collect();
         // From 11 it leads to 12, of which there is no image.
         assert_eq!(actions, [Some(vec![0.5]), None, None], "{how}");
-        assert!(said.contains("2 of 3 commanded motions are left out: they lead from one row to the next"), "{said}");
+        let no_image = if how == "name" { "is of" } else { "was taken at the time of" };
+        for row in ["their row", "the row that they lead to"] {
+            let why = format!("1 of 3 commanded motions are left out: no image that shows anything {no_image} {row}\n");
+            assert!(said.contains(&why), "{why}: {said}");
+        }
         let joints: Vec<_> = samples.iter().map(|sample| sample.joints.clone()).collect();
         assert_eq!(joints, [Some(vec![1.0]), Some(vec![2.0]), None], "{how}");
         assert!(samples.iter().all(|sample| sample.pose.is_some()), "{how}");
         let missing = "1 of 3 samples have a tip pose and no joints, which were read from 10 s to 12 s";
         assert_eq!(said.contains(missing), how == "time", "{said}");
     }
+    // Rows in another order than their images: each is of one, and leads to one that does not come next.
+    folder.write("turned.csv", "image,joints.a,joint_action.a\n10.png,1,0.5\n13.png,2,0.25\n11.png,3,0.5\n");
+    let (said, _) = folder.expect(0, "detect left --pattern tag36h11 --states turned.csv --pair name -o turned.jsonl");
+    let why = "2 of 2 commanded motions are left out: the row that they lead to is not that of the next image";
+    assert!(said.contains(why) && !said.contains("no image"), "{said}");
     // A bag's states belong to its own images.
     folder.write("bag.mcap", "");
     let (_, error) = folder.expect(2, "detect left --pattern tag36h11 --states bag.mcap -o out.jsonl");
