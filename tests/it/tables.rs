@@ -84,12 +84,12 @@ fn the_rig_learned_from_csv_is_that_of_the_recording_byte_for_byte() {
     folder.expect(0, "calibrate motions.csv --rig rig.toml -o from-csv.toml");
     folder.expect(0, "calibrate motions.jsonl --rig rig.toml -o from-lines.toml");
     assert_eq!(folder.read("from-csv.toml"), folder.read("from-lines.toml"));
-    // What is known of cameras is added to any format, and nothing else is asked of JSON Lines.
+    // What is known of cameras is added to any format, and joints are chosen in any.
     let name = &recording.cameras[0].name;
     let (_, error) = folder.expect(2, &format!("convert motions.jsonl --camera {name}=8x6 -o out.jsonl"));
     assert!(error.contains("motions.jsonl: camera") && error.contains("is said to be of 8 x 6 px"), "{error}");
     let (_, error) = folder.expect(2, "convert motions.jsonl --joints a -o out.jsonl");
-    assert!(error.contains("motions.jsonl is a recording, where --joints has no effect"), "{error}");
+    assert!(error.contains("motions.jsonl: there is no joint `a`"), "{error}");
 }
 
 #[test]
@@ -239,9 +239,10 @@ fn times_that_are_dates_in_another_unit_are_converted_and_that_is_said() {
         let said = notes.iter().any(|note| note.contains("since 1970"));
         assert_eq!(said, is_said, "{name}, {unit}: {notes:?}");
     }
-    // Nanoseconds of a clock that begins with the recording show in nothing but the time between rows.
-    let Opened { notes, .. } = csv(&folder, "t,joints.a\n0,0.5\n100000000,0.6\n", &OpenOptions::default()).unwrap();
-    assert!(notes.iter().any(|note| note.contains("up to 100000000 s apart")), "{notes:?}");
+    // One long pause, as over a weekend, is no other unit.
+    let text = "t,joints.a\n0,0.5\n1,0.6\n200001,0.7\n200002,0.8\n";
+    let Opened { notes, .. } = csv(&folder, text, &OpenOptions::default()).unwrap();
+    assert!(notes.iter().any(|note| note.contains("up to 200000 s apart")), "{notes:?}");
 }
 
 #[test]
@@ -260,28 +261,30 @@ fn a_table_is_held_to_what_a_recording_file_is_held_to() {
 #[test]
 fn a_clock_that_counts_since_its_start_is_no_date() {
     let folder = Folder::new("tables-boot");
-    // 20 minutes in nanoseconds and in microseconds, 30 times a second: as dates they would be hours apart.
-    for (start, step) in [(1_200_000_000_000_u64, 33_000_000), (1_200_000_000, 33_000)] {
+    // Of a clock that has run for 20 minutes, or that begins with the recording, in nanoseconds and in microseconds, 30 times a second: as dates, or
+    // as the seconds that numbers are where nothing says otherwise, they would be hours apart.
+    for (start, step, name, unit, taken_for) in [
+        (1_200_000_000_000_u64, 33_000_000, "time_ns", 1e9, "milliseconds since 1970"),
+        (1_200_000_000, 33_000, "time_us", 1e6, "seconds"),
+        (0, 33_000_000, "time_ns", 1e9, "seconds"),
+        (0, 33_000, "time_us", 1e6, "seconds"),
+    ] {
         let rows = |name: &str| -> String {
             let row = |k: u64| format!("{},0.{k}\n", start + step * k);
             format!("{name},joints.a\n{}", (0..5).map(row).collect::<String>())
         };
-        let unit = if step > 1_000_000 { ("time_ns", 1e9) } else { ("time_us", 1e6) };
-        let said = csv(&folder, &rows(unit.0), &OpenOptions::default()).unwrap();
-        let times: Vec<f64> = said.recording.samples.iter().map(|sample| sample.time.unwrap()).collect();
-        assert!((times[4] - times[0] - 4.0 * step as f64 / unit.1).abs() < 1e-9, "{times:?}");
-        match csv(&folder, &rows("time"), &OpenOptions::default()) {
-            Err(error) => {
-                assert!(error.to_string().contains("table.csv: as milliseconds since 1970 most times"), "{error}")
-            }
-            // Seconds are what is taken where nothing says otherwise.
-            Ok(opened) => {
-                assert!(
-                    step < 1_000_000 && opened.notes.iter().any(|note| note.contains("33000 s apart")),
-                    "{opened:?}"
-                );
-            }
+        // So many nanoseconds are no time in seconds at all.
+        let in_seconds = (taken_for == "seconds").then_some(("time_s", 1.0));
+        for (name, unit) in [(name, unit)].into_iter().chain(in_seconds) {
+            let said = csv(&folder, &rows(name), &OpenOptions::default()).unwrap();
+            let times: Vec<f64> = said.recording.samples.iter().map(|sample| sample.time.unwrap()).collect();
+            assert!((times[4] - times[0] - 4.0 * step as f64 / unit).abs() < 1e-9, "{name}: {times:?}");
         }
+        let error = csv(&folder, &rows("time"), &OpenOptions::default()).unwrap_err().to_string();
+        let expected = format!(
+            "table.csv: as {taken_for} most times would be a quarter of an hour or more apart; a column `time_s`, "
+        );
+        assert!(error.contains(&expected), "{start}, {step}: {error}");
     }
 }
 
@@ -380,5 +383,5 @@ fn columns_beside_the_joints_are_not_taken_for_them() {
         (&["a".to_owned(), "b".to_owned()][..], true)
     );
     let error = open("joints.left_a,joints.left_b,joints.right_a,joints.right_b\n1,2,3,4\n").unwrap_err().to_string();
-    assert!(error.contains("left_a or right_a: --joints names those that are meant"), "{error}");
+    assert!(error.contains("left_a or right_a: --joints names those of one robot"), "{error}");
 }

@@ -58,15 +58,16 @@ pub(super) fn read(mut rows: impl Rows, options: &OpenOptions, cameras: &[Record
     }
     let is_guessed = !is_typed && columns.time.is_some_and(|time| time.unit.is_none());
     let is_far = is_guessed && are_far_apart(samples.iter().filter_map(|sample| sample.time));
-    if is_far && let Some(unit) = unit.filter(|unit| *unit != 1.0) {
+    if is_far {
+        let unit = unit.unwrap_or(1.0);
+        let since = if unit == 1.0 { "" } else { " since 1970" };
         return Err(Error::Unusable(format!(
-            "{}: as {} since 1970 most times would be a quarter of an hour or more apart; of a clock that counts since its start, a column `time_ms`, \
-             `time_us` or `time_ns` says the unit",
+            "{}: as {}{since} most times would be a quarter of an hour or more apart; a column `time_s`, `time_ms`, `time_us` or `time_ns` says the unit",
             rows.file(),
             name_of_unit(unit)
         )));
     }
-    if is_far || (farthest > DAY && unit.is_none_or(|unit| unit == 1.0)) {
+    if farthest > DAY && unit.is_none_or(|unit| unit == 1.0) {
         notes.push(format!(
             "rows are up to {farthest} s apart; where times are not in seconds, a column `time_ms`, `time_us` or `time_ns` says so"
         ));
