@@ -205,7 +205,7 @@ pub fn ur5(seed: u64) -> (Rig, Recording) {
     let rig = catalog::rig("ur5").expect("it is shipped");
     let options = SimulateOptions { samples: 25, seed, ..SimulateOptions::default() };
     let recording = simulate(&rig, &options).expect("the rig is in view").recording;
-    let noise = rig.noise.clone();
+    let noise = rig.noise;
     (Rig { robot: rig.robot, noise, ..Rig::default() }, recording)
 }
 
