@@ -93,14 +93,22 @@ pub(super) fn check_freedom(setup: &Setup, freedom: &Freedom, fit: &Fit, is_give
     match now.symmetric_difference(&then).next() {
         None => Ok(()),
         Some(path) => {
-            let problem = if is_given {
-                "is free in one of the given rig and the learned one, and held in the other: that is not the rig that learning started from"
-            } else if then.contains(path) {
-                "was free when the rig was learned, and is held where nothing is known beforehand: give the rig that calibration \
-                 started from, as `--rig RIG`"
-            } else {
-                "was held when the rig was learned, and is free where nothing is known beforehand: give the rig that calibration \
-                 started from, as `--rig RIG`; where only a part was relearned, calibrate all of it again"
+            let problem = match (is_given, then.contains(path)) {
+                (true, true) => {
+                    "was learned, and is held in the given rig: that is not the rig that learning started from"
+                }
+                (true, false) => {
+                    "is free in the given rig, and has no standard deviation in the learned one: either that is not the rig that learning \
+                     started from, or it has moved since (`--relearn`, `monitor`); then calibrate all of it again"
+                }
+                (false, true) => {
+                    "was free when the rig was learned, and is held where nothing is known beforehand: give the rig that calibration \
+                     started from, as `--rig RIG`"
+                }
+                (false, false) => {
+                    "has no standard deviation in the learned rig: it was held, and the rig that calibration started from, as `--rig RIG`, \
+                     says so; or it has moved since (`--relearn`, `monitor`), and all of it is to be calibrated again"
+                }
             };
             Err(Error::Unusable(format!("`{path}` {problem}")))
         }
