@@ -32,7 +32,9 @@ pub fn of_joints() -> Vec<Fault> {
         fault("joints 2 samples early", "joints are 2 samples early", |_, recording| {
             rows(recording, |i, n| (i + 2) % n)
         }),
-        fault("joints reversed", "joints are in reverse order", |_, recording| rows(recording, |i, n| n - 1 - i)),
+        fault("joints reversed", "rows of joints are in reverse order", |_, recording| {
+            rows(recording, |i, n| n - 1 - i)
+        }),
         fault("two rows swapped", "the joint rows of samples 4 and 9 are swapped", |_, recording| {
             rows(recording, |i, _| [(4, 9), (9, 4)].iter().find(|pair| pair.0 == i).map_or(i, |pair| pair.1));
         }),
@@ -68,12 +70,16 @@ pub fn of_joints() -> Vec<Fault> {
     ]
 }
 
-/// Mistakes of recordings of a UR arm whose chain the rig gives: the alphabetical order of some of its drivers, and wrist joints that are exchanged.
+/// Mistakes of recordings of a UR arm whose chain the rig gives: the orders in which its drivers write them, and wrist joints that
+/// are exchanged.
 pub fn of_ur_arms() -> Vec<Fault> {
     let fault = |name, says, plant| Fault { name, says, plant };
     vec![
         fault("joints in alphabetical order", "joints shoulder_pan and elbow are swapped", |_, recording| {
             recording.samples.iter_mut().flat_map(|sample| &mut sample.joints).for_each(|joints| joints.swap(0, 2));
+        }),
+        fault("joints of the ROS 2 driver", "joints begin with another than the base's", |_, recording| {
+            recording.samples.iter_mut().flat_map(|sample| &mut sample.joints).for_each(|joints| joints.rotate_left(1));
         }),
         fault("wrist joints swapped", "joints wrist_1 and wrist_3 are swapped", |_, recording| {
             recording.samples.iter_mut().flat_map(|sample| &mut sample.joints).for_each(|joints| joints.swap(3, 5));

@@ -3,7 +3,6 @@ use super::observation::Kind;
 use super::placed::Placed;
 use super::{Fitting, ReadingNoise};
 use crate::Error;
-use crate::export::note_on_unit;
 use crate::recording::{Recording, Sample};
 use crate::rig::{Camera, Fit, Model, ModelCamera, Rig};
 use nalgebra::Vector3;
@@ -275,7 +274,7 @@ impl PixelDistance {
 impl SpaceErrors {
     /// `None` of nothing, and where the lengths of the rig are no metres.
     pub(crate) fn new(rig: &Rig, distances: &Distances) -> Option<Self> {
-        if note_on_unit(rig).is_some() {
+        if rig.fit.as_ref().is_some_and(|fit| fit.unit().is_some()) {
             return None;
         }
         let mut lengths: Vec<f64> = distances.pixels.iter().filter_map(|pixel| pixel.in_space).collect();

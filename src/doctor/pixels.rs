@@ -5,8 +5,11 @@ use super::{About, Diagnosis, Finding, Misfit, Score, Watch, is_clearly_better, 
 use crate::Error;
 use crate::calibrate::{self, Calibration, Errors, Finding as Unfit, calibrate, evaluate};
 use crate::recording::Recording;
-use crate::rig::Rig;
+use crate::rig::{Noise, Rig};
 use std::ops::ControlFlow;
+
+/// An alternative fits in itself where its misfit is below this many times what noise leaves.
+const FITS: f64 = 5.0;
 
 /// A lag is told from a shift by whole samples where its misfit is below this share of the shift's.
 const FINER: f64 = 0.8;
@@ -59,14 +62,14 @@ pub(super) fn examine(
         let reference = *reference.get_or_insert_with(|| {
             if is_held { score(&held, recording, options, "as recorded", watch) } else { as_recorded }
         });
-        consider(alternative, misfit, reference, &mut best, diagnosis);
+        consider(alternative, misfit, reference, &rig.noise, &mut best, diagnosis);
     }
     let explains = |misfit: &Misfit| misfit.is_explained(&rig.noise);
     let is_fine = |best: &Option<(Misfit, Finding)>| best.as_ref().is_some_and(|(misfit, _)| explains(misfit));
     if !is_fine(&best) && !as_recorded.as_ref().is_some_and(explains) {
         for alternative in alternatives::all(rig, recording) {
             let misfit = score(&alternative.rig, &alternative.recording, options, &alternative.name, watch);
-            consider(alternative, misfit, as_recorded, &mut best, diagnosis);
+            consider(alternative, misfit, as_recorded, &rig.noise, &mut best, diagnosis);
             if is_fine(&best) {
                 break;
             }
@@ -80,7 +83,7 @@ pub(super) fn examine(
                 format!("{sign} {by:.3} s {} the stamps of the joints", if sign == "add" { "to" } else { "from" });
             diagnosis.scores.push(Score { alternative: name.clone(), misfit });
             let beaten = best.as_ref().map(|(best, _)| FINER * best.size());
-            if let Some(misfit) = misfit.filter(|_| is_clearly_better(misfit, as_recorded))
+            if let Some(misfit) = misfit.filter(|misfit| is_right(About::Order, *misfit, as_recorded, &rig.noise))
                 && beaten.is_none_or(|beaten| misfit.size() < beaten)
             {
                 best = Some((misfit, finding(&name, &change)));
@@ -98,16 +101,24 @@ fn consider(
     alternative: Alternative,
     misfit: Option<Misfit>,
     reference: Option<Misfit>,
+    noise: &Noise,
     best: &mut Option<(Misfit, Finding)>,
     diagnosis: &mut Diagnosis,
 ) {
     let Alternative { about, name, change, .. } = alternative;
     diagnosis.scores.push(Score { alternative: name.clone(), misfit });
-    if let Some(misfit) = misfit.filter(|_| is_clearly_better(misfit, reference))
+    if let Some(misfit) = misfit.filter(|misfit| is_right(about, *misfit, reference, noise))
         && best.as_ref().is_none_or(|(best, _)| misfit.size() < best.size())
     {
         *best = Some((misfit, Finding { about, what: name, change }));
     }
+}
+
+/// Where nothing is learned as recorded there is nothing to be better than, and an order of joints undoes part of many others: these have to fit in
+/// themselves.
+fn is_right(about: About, misfit: Misfit, reference: Option<Misfit>, noise: &Noise) -> bool {
+    let fits = || misfit.over_noise(noise).is_none_or(|over_noise| over_noise < FITS);
+    is_clearly_better(Some(misfit), reference) && ((reference.is_some() && about != About::Joints) || fits())
 }
 
 /// Rows of joints or tip poses that the calibration itself found to be exchanged.

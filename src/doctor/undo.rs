@@ -46,7 +46,7 @@ pub(super) fn pairings(what: &str, n: usize) -> Vec<Pairing> {
         })
         .collect();
     let reversed = (0..n).rev().map(Some).collect();
-    all.push((format!("{what} are in reverse order"), format!("reverse the order of the {what}"), reversed));
+    all.push((format!("rows of {what} are in reverse order"), format!("reverse the order of the {what}"), reversed));
     all
 }
 
@@ -66,26 +66,41 @@ const MOST_JOINTS: usize = 8;
 /// reading.
 type JointOrder = (String, String, Vec<usize>);
 
-/// Any two joints in each other's place, where the rig gives the chain: one that is learned says nothing of the joints' order.
+/// Orders in which drivers write joints, and any two joints in each other's place, where the rig gives the chain: one that is learned says nothing
+/// of the joints' order.
 pub(super) fn joint_orders(rig: &Rig, recording: &Recording) -> Vec<JointOrder> {
     let n = recording.joints.len();
     if n > MOST_JOINTS || arm(rig, recording).is_none() {
         return Vec::new();
     }
     let of_rig = rig.robot.joint_names();
-    let swapped = |i: usize, j: usize| {
-        let mut order: Vec<usize> = (0..n).collect();
-        order.swap(i, j);
-        let names: Vec<String> = order.iter().map(|place| recording.joints[*place].clone()).collect();
-        let [a, b] = [i, j].map(|place| &recording.joints[place]);
-        let change = if is_in_another_order(&names, &of_rig) {
-            format!("what is called {a} is {b}, and the other way round: exchange their names, or their readings")
+    let names = |order: &[usize]| order.iter().map(|place| recording.joints[*place].clone()).collect::<Vec<String>>();
+    let change = |order: &[usize]| {
+        let names = names(order);
+        if is_in_another_order(&names, &of_rig) {
+            let moved = order.iter().enumerate().filter(|(joint, place)| joint != *place);
+            let calls =
+                moved.map(|(joint, place)| format!("{} is {}", recording.joints[*place], recording.joints[joint]));
+            format!("what is called {}: exchange names, or readings", calls.collect::<Vec<_>>().join(", "))
         } else {
             format!("from base to tip they are {}: --joints {} reads them so", names.join(", "), names.join(","))
-        };
-        (format!("joints {a} and {b} are swapped"), change, order)
+        }
     };
-    (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j))).map(|(i, j)| swapped(i, j)).collect()
+    let as_is: Vec<usize> = (0..n).collect();
+    let swapped = (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j))).map(|(i, j)| {
+        let mut order = as_is.clone();
+        order.swap(i, j);
+        (format!("joints {} and {} are swapped", recording.joints[i], recording.joints[j]), order)
+    });
+    // Of two joints all of these are one exchange, and of three the reverse is.
+    let turned = (1..n).filter(|_| n > 2).map(|first| {
+        let mut order = as_is.clone();
+        order.rotate_left(first);
+        (format!("joints begin with another than the base's, which is {}", recording.joints[first]), order)
+    });
+    let reversed = (n > 3).then(|| ("joints go from tip to base".to_owned(), as_is.iter().rev().copied().collect()));
+    let all = swapped.chain(turned).chain(reversed);
+    all.map(|(name, order)| (name, change(&order), order)).collect()
 }
 
 /// The recording with the readings, and commanded motions, of joints at other places.

@@ -1,12 +1,9 @@
 //! What is said where the lengths of a rig are no metres.
 use crate::rig::Rig;
 
-/// How the line of `[fit]`'s `gauge` begins where nothing metric was known while the rig was learned.
-const NO_METRES: &str = "lengths are in units of ";
-
 /// The unit of a rig's lengths and what would do; `None` where they are metres.
 pub fn note_on_unit(rig: &Rig) -> Option<String> {
-    let unit = rig.fit.as_ref()?.gauge.iter().find(|line| line.starts_with(NO_METRES))?;
+    let unit = rig.fit.as_ref()?.unit()?;
     Some(format!("these are not metres: {unit}; one known length in the --rig of calibrate would make them metres"))
 }
 

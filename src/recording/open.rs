@@ -82,10 +82,11 @@ impl Recording {
     /// Errors: those of both.
     pub fn open_all(paths: &[PathBuf], options: &OpenOptions) -> Result<Opened, Error> {
         let mut all_notes = Vec::new();
-        let mut of_file = options.clone();
+        let (mut of_file, mut first_has) = (options.clone(), false);
         let recording = Recording::read_all_with(paths, &mut |path| {
             let Opened { recording, notes, .. } = open(path, &of_file)?;
-            if !recording.joints.is_empty() {
+            if !recording.joints.is_empty() && !first_has {
+                first_has = true;
                 of_file.known_joints.clone_from(&recording.joints);
             }
             all_notes.extend(notes.iter().map(|note| format!("{}: {note}", path.display())));

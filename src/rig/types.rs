@@ -349,3 +349,13 @@ pub struct Fit {
     /// Standard deviation of every learned scalar by parameter path; poses and points have 6 and 3 numbers.
     pub sd: BTreeMap<String, Vec<f64>>,
 }
+
+/// How the line of `gauge` begins where nothing metric was known while the rig was learned.
+const NO_METRES: &str = "lengths are in units of ";
+
+impl Fit {
+    /// The line of `gauge` that names the unit of the rig's lengths; `None` where they are metres.
+    pub fn unit(&self) -> Option<&str> {
+        self.gauge.iter().map(String::as_str).find(|line| line.starts_with(NO_METRES))
+    }
+}

@@ -152,7 +152,7 @@ fn readings_outside_the_limits_of_the_rig_are_found_first() {
 
 /// As drivers have them that write joints by the alphabet, under names that are not the rig's and under those that are.
 #[test]
-fn two_joints_in_each_other_s_place_are_found_with_what_puts_them_right_and_none_are_in_clean_or_noisier_recordings() {
+fn joints_in_other_orders_are_found_with_what_puts_them_right_and_none_are_in_clean_or_noisier_recordings() {
     for seed in 1..=2 {
         assert_eq!(found(&faults::ur5(seed).0, &faults::ur5(seed).1), Vec::<String>::new(), "seed {seed}");
         faults::of_ur_arms().iter().for_each(|fault| is_found(fault, faults::ur5(seed), seed));
@@ -162,6 +162,7 @@ fn two_joints_in_each_other_s_place_are_found_with_what_puts_them_right_and_none
     let noisy = examine(&rig, &recording, &Options::default());
     let tried = noisy.scores.iter().filter(|score| score.alternative.ends_with("are swapped")).count();
     assert_eq!((noisy.findings.len(), tried), (0, 15), "{noisy:?}");
+    rig.noise.pixels *= 10.0;
     (faults::of_ur_arms()[0].plant)(&mut rig, &mut recording);
     let change = |recording: &Recording| {
         let mut findings = examine(&rig, recording, &Options::default()).findings;
@@ -169,10 +170,26 @@ fn two_joints_in_each_other_s_place_are_found_with_what_puts_them_right_and_none
         findings.remove(0).change
     };
     let called_so = change(&recording);
-    assert!(called_so.starts_with("what is called shoulder_pan is elbow, and the other way round"), "{called_so}");
+    assert!(
+        called_so.starts_with("what is called elbow is shoulder_pan, shoulder_pan is elbow: exchange"),
+        "{called_so}"
+    );
     recording.joints = ["e", "l", "p", "w1", "w2", "w3"].map(str::to_owned).to_vec();
     let otherwise = change(&recording);
     assert!(otherwise.ends_with(": --joints p,l,e,w1,w2,w3 reads them so"), "{otherwise}");
+}
+
+/// Three joints in a ring are in none of the orders that are tried: a wrong cure would be worse than none, though some fit less badly and nothing
+/// is learned from the data as recorded.
+#[test]
+fn an_order_of_joints_that_is_not_tried_is_not_taken_for_one_that_is() {
+    for seed in 1..=3 {
+        let (rig, mut recording) = faults::ur5(seed);
+        let readings = recording.samples.iter_mut().flat_map(|sample| &mut sample.joints);
+        readings.for_each(|joints| joints[..3].rotate_left(1));
+        let found = found(&rig, &recording);
+        assert!(found.iter().all(|what| what.contains("outside the rig's limits")), "seed {seed}: {found:?}");
+    }
 }
 
 /// A camera in the world that sees a target on the tip, which tells in closed form where the tip is.

@@ -238,6 +238,16 @@ fn files_of_one_robot_join_whatever_the_order_of_its_joints_and_what_is_beside_t
     assert_eq!(recording.joints, ["a", "b"]);
     assert_eq!(recording.samples[1].joints, Some(vec![3.0, 4.0]));
     assert!(notes.iter().any(|note| note.contains("2.jsonl: joints that are left out: finger")), "{notes:?}");
+    // The joints of the first file say which of two arms is meant in all others.
+    let header = |joints: &str| header(joints, "{}");
+    let left = file(&folder, "3.jsonl", &(header(r#"["left_a","left_b"]"#) + "{\"joints\":[1,2]}\n"));
+    let both = header(r#"["right_b","right_a","left_b","left_a"]"#) + "{\"joints\":[9,8,6,5]}\n";
+    let bare = file(&folder, "5.jsonl", &(header(r#"["finger","b","a"]"#) + "{\"joints\":[7,4,3]}\n"));
+    let both = file(&folder, "4.jsonl", &both);
+    let joined = Recording::open_all(&[left, bare, both], &OpenOptions::default()).unwrap().recording;
+    assert_eq!(joined.joints, ["left_a", "left_b"]);
+    let joints: Vec<Vec<f64>> = joined.samples.into_iter().map(|sample| sample.joints.unwrap()).collect();
+    assert_eq!(joints, [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]);
     let error = Recording::open_all(&[next, first], &OpenOptions::default()).unwrap_err().to_string();
     assert!(error.contains("joints finger, arm_b, arm_a and a, b; where they are of one robot"), "{error}");
 }

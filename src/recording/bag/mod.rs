@@ -87,12 +87,13 @@ pub(super) fn read<'a>(
     let files = folder::files(path)?;
     let mut images = Images::new(path, &options.bag, detect);
     let mut notes = messages::visit(&files, &mut images)?;
+    let cut_off = notes.first().cloned();
     notes.extend(images.finish()?);
     let mut of_cameras = Vec::new();
     let (cameras, camera_of_source) = cameras::cameras(path, &mut images, options, &mut of_cameras)?;
     let groups = groups(&images.images, &camera_of_source, options.bag.join.map(nanoseconds));
     if groups.is_empty() {
-        let problem = nothing(&images.topics, &options.bag, is_of_messages, notes.first());
+        let problem = nothing(&images.topics, &options.bag, is_of_messages, cut_off);
         return Err(Error::Unusable(format!("{}: {problem}", path.display())));
     }
     let robot = Robot::new(path, options, &images)?;
@@ -122,7 +123,7 @@ pub(super) fn read<'a>(
 }
 
 /// Why a bag without images that show anything is none; `cut_off`: where it ends early.
-fn nothing(topics: &[Topic], options: &BagOptions, is_of_messages: bool, cut_off: Option<&String>) -> String {
+fn nothing(topics: &[Topic], options: &BagOptions, is_of_messages: bool, cut_off: Option<String>) -> String {
     let wanted = if is_of_messages {
         "image with features (apriltag_msgs/AprilTagDetectionArray or vision_msgs/Detection2DArray)"
     } else {
