@@ -28,6 +28,8 @@ pub(super) struct State {
     pub drifts: Vec<[f64; 6]>,
     /// How far the chain's given values are off [rad, m], where the rig does not say.
     pub spread: [f64; 2],
+    /// The share of the views' noise that their residuals show, by coordinate, in standard deviations: what is free takes up the rest.
+    pub shown: [f64; 6],
 }
 
 /// Which scalars are free besides the poses.
@@ -42,6 +44,8 @@ pub(super) struct Built {
     pub cameras: Vec<Key<Pose>>,
     pub targets: Vec<Key<Pose>>,
     pub parameters: Option<Key<DynamicVector>>,
+    /// `camera_from_target` of each view as predicted.
+    pub predicted: Vec<Key<Pose>>,
     tips: Vec<Key<Pose>>,
     drifts: Vec<Key<Vector<6>>>,
     pub offset: Key<Vector<1>>,
@@ -83,7 +87,7 @@ pub(super) fn build(setup: &Setup, state: &State, freedom: Freedom, loss: Loss) 
     let world = graph.held(Pose::identity());
     let carrier = |parent: Parent, moment: usize| if parent == Parent::World { world } else { tips[moment] };
     let still = graph.held(Vector::<6>::zeros());
-    let mut drifts = Vec::with_capacity(setup.views.len());
+    let (mut drifts, mut predicted) = (Vec::with_capacity(setup.views.len()), Vec::with_capacity(setup.views.len()));
     for (index, view) in setup.views.iter().enumerate() {
         let mount = carrier(rig.cameras[view.camera].parent, view.moment);
         let below = carrier(rig.targets[view.target].parent, view.moment);
@@ -93,13 +97,14 @@ pub(super) fn build(setup: &Setup, state: &State, freedom: Freedom, loss: Loss) 
             None => still,
         };
         drifts.push(drift);
+        predicted.push(seen);
         let factor = graph.factor(setup.seen(index), (seen, scale, drift)).loss(loss);
         match view.whitening {
             Some(whitening) => factor.whitening(whitening),
             None => factor.sigmas(state.sigmas),
         };
     }
-    Built { graph, cameras, targets, parameters, tips, drifts, offset, scale }
+    Built { graph, cameras, targets, parameters, predicted, tips, drifts, offset, scale }
 }
 
 /// A drift that walks on from the one before.

@@ -20,7 +20,7 @@ use crate::recording::Recording;
 use crate::rig::{Parent, Rig};
 use graph::{Built, Freedom, State, build};
 use handeye_solvers::manifold::so3;
-use handeye_solvers::{Loss, Pose, Report as FitReport, Solver};
+use handeye_solvers::{Covariance, Loss, Pose, Report as FitReport, Solver};
 use moments::{Stream, chain_of};
 use setup::Setup;
 use start::{Start, starts};
@@ -125,7 +125,10 @@ impl Fitted {
             let mut built = build(&setup, &state, freedom, Loss::Cauchy(TAILS));
             let (report, solver) = built.minimize(&mut state)?;
             iterations += report.iterations;
-            spread::estimate(&setup, &built, &mut state);
+            if let Ok(mut covariance) = Covariance::with(&built.graph, Solver::new(&built.graph)) {
+                state.shown = scatter::shown(&setup, &built, &state, &mut covariance);
+                spread::estimate(&setup, &built, &mut covariance, &mut state);
+            }
             if round == 0 {
                 first_cost = report.initial_cost;
             }
@@ -221,6 +224,7 @@ fn first_state(setup: &Setup, start: &Start, offset: f64) -> State {
         walks: [0.0; 2],
         drifts: vec![[0.0; 6]; setup.views.len()],
         spread: spread::FIRST,
+        shown: [1.0; 6],
     }
 }
 

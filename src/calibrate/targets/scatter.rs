@@ -1,10 +1,10 @@
 //! How far reported targets are from where the model has them, and the noise that this scatter shows: its size, and how far the
 //! reports drift, as those of visual odometry do.
-use super::graph::State;
+use super::graph::{Built, State};
 use super::setup::Setup;
 use crate::factors::CameraFromTarget;
 use crate::rig::Parent;
-use handeye_solvers::{Factor, Function, Pose, Vector};
+use handeye_solvers::{Covariance, Factor, Function, Pose, Vector};
 
 /// Gains that are tried: shares of what is new in an error that stay. None: errors of views are independent.
 const GAINS: [f64; 9] = [0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95];
@@ -15,6 +15,12 @@ const FEWEST: usize = 20;
 
 /// What differs from the error before by more than this [standard deviations] moves a drift no further.
 const CLIPPED: f64 = 3.0;
+
+/// Views whose leverage is computed, spread evenly over the recording.
+const LEVERAGES: usize = 200;
+
+/// Where residuals show less of the noise's variance than this, they do not tell it.
+const LEAST_SHOWN: f64 = 0.25;
 
 /// Rotations, then translations.
 const GROUPS: [std::ops::Range<usize>; 2] = [0..3, 3..6];
@@ -34,16 +40,37 @@ pub(super) fn size(setup: &Setup, state: &State, index: usize) -> f64 {
     }
 }
 
-/// Puts the noise into the state that the scatter of the views shows.
+/// Puts the noise into the state that the scatter of the views shows, and what the fit before took up of it.
 ///
 /// The model of an error is white noise on a random walk. Its best prediction from the errors before is their exponential mean, by a
 /// gain K; with σ of what is new against that, the noise is σ √(1 - K) and the walk goes by σ K (Muth 1960). K is the one under
 /// which σ is least, of rotations and of translations each.
 pub(super) fn estimate(setup: &Setup, state: &mut State) {
     (state.sigmas, state.walks) = noise(setup, state);
+    for (k, sigma) in state.sigmas.iter_mut().enumerate().filter(|(k, _)| state.walks[k / 3] == 0.0) {
+        *sigma /= state.shown[k];
+    }
     for (group, _) in GROUPS.into_iter().zip(state.walks).filter(|(_, walk)| *walk == 0.0) {
         state.drifts.iter_mut().for_each(|drift| drift[group.clone()].fill(0.0));
     }
+}
+
+/// The share of the noise that residuals show after a fit: the root of 1 - h, with h the mean leverage of a coordinate.
+pub(super) fn shown(setup: &Setup, built: &Built, state: &State, covariance: &mut Covariance<'_>) -> [f64; 6] {
+    let views = || setup.views.iter().zip(&built.predicted).filter(|(view, _)| view.whitening.is_none());
+    let every = views().count().div_ceil(LEVERAGES).max(1);
+    let (mut leverages, mut n) = ([0.0; 6], 0.0_f64);
+    for (view, &predicted) in views().step_by(every) {
+        let of_pose = covariance.of(predicted);
+        // The residual turns in the target's frame.
+        let rotation = view.seen.rotation;
+        let turned = rotation.transpose() * of_pose.fixed_view::<3, 3>(0, 0) * rotation;
+        for (k, leverage) in leverages.iter_mut().enumerate() {
+            *leverage += if k < 3 { turned[(k, k)] } else { of_pose[(k, k)] } / state.sigmas[k].powi(2);
+        }
+        n += 1.0;
+    }
+    leverages.map(|leverage| (1.0 - leverage / n.max(1.0)).max(LEAST_SHOWN).sqrt())
 }
 
 /// Standard deviations of the six numbers, and by how much rotations and translations walk.

@@ -3,10 +3,10 @@ use super::graph::{Built, State};
 use super::setup::Setup;
 use crate::chain::LINK_PARAMETERS;
 use crate::rig::{JointField, Parameter};
-use handeye_solvers::{Covariance, Solver};
+use handeye_solvers::Covariance;
 
 /// What an arm is off before anything is estimated [rad, m], and how many parameters that is worth against those of the rig.
-pub(super) const FIRST: [f64; 2] = [0.0005, 0.0003];
+pub(super) const FIRST: [f64; 2] = [1e-4, 6e-5];
 const WORTH: f64 = 1.0;
 
 /// One step of MacKay's fixed point for the standard deviations of angles and of lengths around the given values:
@@ -15,9 +15,8 @@ const WORTH: f64 = 1.0;
 ///
 /// The denominator counts the parameters that the data determine. Values with a prior of their own, and held ones, do not take
 /// part.
-pub(super) fn estimate(setup: &Setup, built: &Built, state: &mut State) {
+pub(super) fn estimate(setup: &Setup, built: &Built, covariance: &mut Covariance<'_>, state: &mut State) {
     let Some((key, given)) = built.parameters.zip(super::chain_of(&setup.rig)) else { return };
-    let Ok(mut covariance) = Covariance::with(&built.graph, Solver::new(&built.graph)) else { return };
     let covariance = covariance.of(key);
     let (mut squares, mut determined) = ([0.0; 2], [0.0; 2]);
     for (joint, row) in setup.rig.robot.joints.iter().enumerate() {
