@@ -303,8 +303,9 @@ def calibrate(
     select_noise: bool = False,
     influence: bool = False,
     seed: int = 1,
-    tag_side: float | None = None,
-    lengths: Sequence[tuple[str, str, float]] | None = None,
+    tag_side: float | tuple[float, float] | None = None,
+    lengths: Sequence[tuple[str, str, float] | tuple[str, str, float, float]] | None = None,
+    eye_in_hand: bool = False,
     progress: Callable[[Progress], object] | None = None,
     threads: int | None = None,
 ) -> Calibration: ...

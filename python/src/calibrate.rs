@@ -16,13 +16,29 @@ use pyo3::types::PyDict;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+/// The side of all tags [m], and its standard deviation.
+#[derive(FromPyObject)]
+pub enum TagSide {
+    Alone(f64),
+    WithDeviation(f64, f64),
+}
+
+/// Two ends, what was measured between them [m], and its standard deviation.
+#[derive(FromPyObject)]
+pub enum Length {
+    WithDeviation(String, String, f64, f64),
+    Alone(String, String, f64),
+}
+
 /// Learns what is unknown of a rig from a recording, and refines the rest.
 ///
 /// rig: what is known; left out, everything is learned from the recording alone. relearn: paths of parameters to learn anew from few
 /// samples while everything else is held, such as ``["cameras.left"]``. estimate_noise: the noise of pixels, points, joints, poses and
 /// actions is estimated from the data. select_noise: the noise of joints or poses is picked by how well samples held out are predicted.
-/// tag_side: the side of all tags whose corners are features [m]. lengths: distances that were measured between two features or two
-/// cameras, such as ``[("features.f0", "features.f7", 0.12)]`` [m]; both are taken to be 0.5 mm off.
+/// tag_side: the side of all tags whose corners are features [m], or that and its standard deviation. lengths: distances that were
+/// measured between two features or two cameras, such as ``[("features.f0", "features.f7", 0.12)]`` [m], each with its standard deviation
+/// as a fourth where it is known; 0.5 mm where not. eye_in_hand: cameras that the rig does not list are on the hand, and what they see
+/// stands in the world.
 /// influence: what leaving out each sample would change is computed too. seed: the same seed gives the same rig, byte for byte.
 /// progress: called with a ``Progress`` as the work goes on; what it raises ends the work, and so does Ctrl-C. threads: to work on, all
 /// cores where left out; the result does not depend on it.
@@ -33,7 +49,7 @@ use std::sync::Arc;
 /// fit together.
 #[pyfunction]
 #[pyo3(signature = (recording, rig = None, *, relearn = None, estimate_noise = false, select_noise = false, influence = false, seed = 1,
-    tag_side = None, lengths = None, progress = None, threads = None))]
+    tag_side = None, lengths = None, eye_in_hand = false, progress = None, threads = None))]
 #[expect(clippy::too_many_arguments, reason = "one keyword per option")]
 pub fn calibrate(
     py: Python<'_>,
@@ -44,17 +60,30 @@ pub fn calibrate(
     select_noise: bool,
     influence: bool,
     seed: u64,
-    tag_side: Option<f64>,
-    lengths: Option<Vec<(String, String, f64)>>,
+    tag_side: Option<TagSide>,
+    lengths: Option<Vec<Length>>,
+    eye_in_hand: bool,
     progress: Option<Py<PyAny>>,
     threads: Option<usize>,
 ) -> PyResult<Calibration> {
     let (mut before, text) = rig.map_or_else(Default::default, |rig| (rig.inner.clone(), rig.text.clone()));
-    before.estimate.tag_side = tag_side.map(|side| [side, rig::Length::RULER]).or(before.estimate.tag_side);
-    for (one, other, length) in lengths.unwrap_or_default() {
+    let (recording, notes) = (recording.inner.clone(), recording.notes.clone());
+    if eye_in_hand && !library::put_on_tip(&mut before, &recording) {
+        return Err(unusable("eye_in_hand: the rig lists every camera with its parent".to_owned()));
+    }
+    let tag_side = tag_side.map(|side| match side {
+        TagSide::Alone(side) => [side, rig::Length::RULER],
+        TagSide::WithDeviation(side, sd) => [side, sd],
+    });
+    before.estimate.tag_side = tag_side.or(before.estimate.tag_side);
+    for length in lengths.unwrap_or_default() {
+        let (one, other, length, sd) = match length {
+            Length::Alone(one, other, length) => (one, other, length, rig::Length::RULER),
+            Length::WithDeviation(one, other, length, sd) => (one, other, length, sd),
+        };
         let between =
             rig::Ends::new([&one, &other]).map_err(|problem| PyValueError::new_err(format!("lengths: {problem}")))?;
-        before.estimate.measure(rig::Length { between, length, sd: rig::Length::RULER });
+        before.estimate.measure(rig::Length { between, length, sd });
     }
     for (other, is_given) in [("relearn", relearn.is_some()), ("estimate_noise", estimate_noise)] {
         if select_noise && is_given {
@@ -62,7 +91,6 @@ pub fn calibrate(
         }
     }
     let options = Options { seed, estimate_noise, influence };
-    let (recording, notes) = (recording.inner.clone(), recording.notes.clone());
     let (before, inner) = work::run(py, progress.as_ref(), threads, |observer| {
         if select_noise {
             let trials = library::select_noise(&before, &recording, &options, observer)?;

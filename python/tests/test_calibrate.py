@@ -142,6 +142,8 @@ def test_a_measured_length_tells_how_large_everything_is(motions, ur5):
 
     learned = handeye.calibrate(motions, lengths=[("features.f0", "features.f7", distance(ur5, "f0", "f7"))])
     assert learned.tip.metric
+    with_sd = [("features.f0", "features.f7", distance(ur5, "f0", "f7"), 0.0005)]
+    assert handeye.calibrate(motions, lengths=with_sd).rig == learned.rig
     assert abs(distance(learned.rig, "f2", "f9") / distance(ur5, "f2", "f9") - 1.0) < 0.01
     assert not handeye.calibrate(motions).tip.metric
     with pytest.raises(ValueError, match="two features or two cameras"):
@@ -150,9 +152,18 @@ def test_a_measured_length_tells_how_large_everything_is(motions, ur5):
         with pytest.raises(handeye.UnusableInput, match="above 0"):
             handeye.calibrate(motions, lengths=[("features.f0", "features.f7", wrong)])
     with pytest.raises(handeye.UnusableInput, match="below 2 m"):
-        handeye.calibrate(motions, tag_side=60.0)
+        handeye.calibrate(motions, tag_side=(60.0, 0.2))
     with pytest.raises(handeye.UnusableInput, match="no tag has its four corners"):
         handeye.calibrate(motions, tag_side=0.06)
+
+
+def test_cameras_that_no_rig_lists_are_put_on_the_hand(ur5, motions):
+    # These stand in the world, so that nothing fits where they are taken to be on the hand.
+    wrong = handeye.calibrate(motions, "ur5_arm", eye_in_hand=True)
+    assert wrong.rig.parent("cameras.left") == "tip" and wrong.rig.parent("features.f0") == "world"
+    assert wrong.rms_px > 10.0 * handeye.calibrate(motions, "ur5_arm").rms_px
+    with pytest.raises(handeye.UnusableInput, match="eye_in_hand: the rig lists every camera"):
+        handeye.calibrate(motions, ur5, eye_in_hand=True)
 
 
 def test_wrong_samples_are_named(ur5, motions):

@@ -40,6 +40,7 @@ mod suggest;
 mod targets;
 mod trunk;
 mod unknown;
+mod unlisted;
 mod variances;
 mod visual;
 mod weak;
@@ -65,6 +66,8 @@ pub use report::{
 pub use selection::{NoiseTrial, select_noise};
 pub use suggest::{SuggestOptions, SuggestedSample, Suggestion, suggest};
 pub use targets::{Disagreement, TargetReport};
+pub use unlisted::put_on_tip;
+pub(crate) use unlisted::{list_cameras, list_features};
 pub(crate) use weak::in_words as combinations_in_words;
 pub use weak::{Combination, DeterminedBy};
 

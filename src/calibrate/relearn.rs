@@ -1,13 +1,13 @@
 //! A part of a learned rig learned anew from few samples, with everything else held: a camera that was moved or added, another
 //! object in the gripper, another place of the base.
-use super::{Calibration, Observer, Options, calibrate};
+use super::{Calibration, Observer, Options, calibrate, list_cameras, list_features};
 use crate::Error;
 use crate::recording::Recording;
-use crate::rig::{Camera, Feature, Model, Parameter, Parent, Rig, matches};
+use crate::rig::{Camera, Model, Parameter, Rig, matches};
 
 /// Learns the parameters that match any of `paths` (globs as in the rig file) from `recording`, from no start: their old values
 /// are forgotten. Everything else is held, and stays as it is to the last bit. Cameras and features of the recording that the rig
-/// does not know are learned too, as if in the world and on the tip; to put them elsewhere, list them in the rig with their parent.
+/// does not know are learned too, as if in the world and on the tip (in the world, where cameras on the tip alone see them); to put them elsewhere, list them in the rig with their parent.
 ///
 /// Intrinsics of a camera that is relearned start at what the recording's header says of it, else at the old ones, and are known
 /// as roughly as those of a new camera. Relearning all of `robot.joints` takes the features on the arm along: a chain has no
@@ -52,16 +52,8 @@ pub fn relearn(
 /// The rig with the cameras and features that only the recording has, of which nothing is known.
 fn with_new_parts(rig: &Rig, recording: &Recording) -> Rig {
     let mut all = rig.clone();
-    for recorded in &recording.cameras {
-        if !rig.cameras.iter().any(|camera| camera.name == recorded.name) {
-            all.cameras.push(Camera { name: recorded.name.clone(), ..Camera::default() });
-        }
-    }
-    for name in &recording.features {
-        if !rig.features.iter().any(|feature| feature.name == *name) {
-            all.features.push(Feature { name: name.clone(), parent: Parent::Tip, xyz: None });
-        }
-    }
+    list_cameras(&mut all, recording);
+    list_features(&mut all, recording);
     all
 }
 

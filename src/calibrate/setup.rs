@@ -4,6 +4,7 @@ use super::evaluate::Correspondence;
 use super::lengths::{self, Found};
 use super::observation::{Kind, Observation, Place};
 use super::states::States;
+use super::unlisted;
 use crate::Error;
 use crate::camera::{CameraModel, PARAMETERS};
 use crate::chain::LINK_PARAMETERS;
@@ -39,21 +40,13 @@ impl Setup {
         let mut rig = rig.clone();
         name_joints(&mut rig, recording)?;
         let mut intrinsics = Vec::new();
-        for recorded in &recording.cameras {
-            if !rig.cameras.iter().any(|camera| camera.name == recorded.name) {
-                rig.cameras.push(Camera { name: recorded.name.clone(), ..Camera::default() });
-            }
-        }
+        unlisted::list_cameras(&mut rig, recording);
         let unseen = leave_out_unseen_cameras(&mut rig, recording);
         for camera in &mut rig.cameras {
             let recorded = recording.cameras.iter().find(|recorded| recorded.name == camera.name);
             intrinsics.push(complete_camera(camera, recorded, recording)?);
         }
-        for name in &recording.features {
-            if !rig.features.iter().any(|feature| feature.name == *name) {
-                rig.features.push(Feature { name: name.clone(), parent: Parent::Tip, xyz: None });
-            }
-        }
+        unlisted::list_features(&mut rig, recording);
         check_held(&rig)?;
         let model = placeholder_model(&rig);
         let index = Correspondence::new(&rig, recording);

@@ -2,7 +2,7 @@
 use super::answer::Answer;
 use super::counts::learned_in_words;
 use super::folds::Folds;
-use super::inputs::{check_output, files_read, is_same, read_and_remark, read_rig, write_output};
+use super::inputs::{check_output, eye_in_hand, files_read, is_same, read_and_remark, read_rig, write_output};
 use super::noise;
 use super::progress::Bar;
 use super::reading::Reading;
@@ -33,6 +33,7 @@ Examples:
   handeye calibrate motions.jsonl --rig arm.toml -o arm.toml            keeps its comments
   handeye calibrate motions.jsonl -o learned.toml --report page.html    a page to read
   handeye calibrate robot.mcap --rig ur5e --tag-side 0.06 -o arm.toml   tags that tell how large everything is
+  handeye calibrate robot.mcap --rig panda --eye-in-hand -o arm.toml    a camera on the wrist, features in the world
   handeye calibrate three.jsonl --rig arm.toml --relearn cameras.left -o arm.toml   a camera that was moved
   handeye calibrate five.jsonl --rig arm.toml --relearn cameras.top -o arm.toml     a camera that is new
   handeye calibrate two.jsonl --rig arm.toml --relearn 'features.tool*' -o arm.toml another object in the gripper")]
@@ -78,6 +79,9 @@ pub struct Calibrate {
     /// Threads to work on; the result does not depend on it [default: as many as there are cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
+    /// Cameras that the rig does not list are on the hand, and what they see stands in the world; without it they stand in the world
+    #[arg(long)]
+    eye_in_hand: bool,
     #[command(flatten)]
     reading: Reading,
 }
@@ -101,6 +105,9 @@ fn metres(text: &str) -> Result<[f64; 2], String> {
     number(length).zip(sd).map(Into::into).ok_or_else(|| "expected lengths above 0, in metres".to_owned())
 }
 
+/// Errors of so many times the noise are those of a model that is wrong.
+const MISFIT: f64 = 10.0;
+
 impl Calibrate {
     pub fn run(&self, is_json: bool, typed: &str) -> Result<Answer, Error> {
         let input = self.rig.as_deref().map(read_rig).transpose()?;
@@ -116,6 +123,10 @@ impl Calibrate {
             }
         }
         let (mut rig, text) = input.map_or_else(|| (Rig::default(), None), |input| (input.rig, Some(input.text)));
+        let places_cameras = !rig.cameras.is_empty() || self.eye_in_hand;
+        if self.eye_in_hand {
+            eye_in_hand(&mut rig, &recording)?;
+        }
         self.length.iter().for_each(|length| rig.estimate.measure(length.clone()));
         rig.estimate.tag_side = self.tag_side.or(rig.estimate.tag_side);
         let options = Options { seed: self.seed, estimate_noise: self.estimate_noise, influence: self.influence };
@@ -166,6 +177,16 @@ impl Calibrate {
             answer.failure = Some(format!(
                 "{output} was not written: {reason}; more varied motions, or a rig that gives more, would do"
             ));
+        }
+        let spoils = report.rms_px > MISFIT * rig.noise.pixels;
+        if !places_cameras && report.targets.is_none() && (!report.converged || spoils) {
+            let hint = "cameras that no rig lists are taken to stand in the world: where they are on the hand, say --eye-in-hand (handeye check \
+                        RIG REC tries that and other mistakes)";
+            match &mut answer.failure {
+                Some(failure) => *failure += &format!("; {hint}"),
+                None => answer.text += &format!("\n{hint}\n"),
+            }
+            answer.json["hint"] = json!(hint);
         }
         if let Some(path) = &self.report {
             let title = format!("{}, learned from {}", file_name(&self.output), file_names(&self.recordings));

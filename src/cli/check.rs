@@ -1,7 +1,7 @@
 //! `handeye check`: what a rig file says, and whether a recording goes with it.
 use super::answer::Answer;
 use super::counts::Counts;
-use super::inputs::{RigInput, read_rig, read_with_notes};
+use super::inputs::{RigInput, eye_in_hand, read_rig, read_with_notes};
 use super::progress::Bar;
 use super::reading::Reading;
 use super::survey::Survey;
@@ -28,6 +28,9 @@ pub struct Check {
     /// Recordings to hold against it
     #[arg(value_name = "REC")]
     recordings: Vec<PathBuf>,
+    /// Cameras that the rig does not list are on the hand, and what they see stands in the world
+    #[arg(long)]
+    eye_in_hand: bool,
     #[command(flatten)]
     reading: Reading,
 }
@@ -36,6 +39,9 @@ impl Check {
     pub fn run(&self, is_json: bool) -> Result<Answer, Error> {
         if self.recordings.is_empty() {
             self.reading.refuse_without_recording()?;
+            if self.eye_in_hand {
+                return Err(Error::Unusable("no recording is read, where --eye-in-hand has no effect".to_owned()));
+            }
         }
         let input = read_rig(&self.rig)?;
         let RigInput { rig, name, .. } = &input;
@@ -66,6 +72,11 @@ impl Check {
         });
         if !self.recordings.is_empty() {
             let (recording, notes) = read_with_notes(&self.recordings, Some(&input), &self.reading, &[])?;
+            let mut placed = rig.clone();
+            if self.eye_in_hand {
+                eye_in_hand(&mut placed, &recording)?;
+            }
+            let rig = &placed;
             let survey = Survey::new(rig, &recording);
             text += &format!("\n{survey}");
             json["recording"] = survey.json();

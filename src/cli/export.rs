@@ -16,7 +16,8 @@ Examples:
   handeye export learned.toml --to urdf --urdf arm.urdf -o calibrated.urdf   the same file with calibrated joint origins
   handeye export arm.toml --to dh                                            a URDF's arm as Denavit-Hartenberg rows
   handeye export learned.toml --to camera-info --camera left -o left.yaml
-  handeye export learned.toml --to static-transforms                         lines to run or to put into a launch file")]
+  handeye export learned.toml --to static-transforms                         lines to run or to put into a launch file
+  handeye export learned.toml --to tf --base-frame panda_link0 --tip-frame panda_link8")]
 pub struct Export {
     /// A rig file, or the name of a shipped rig
     #[arg(value_name = "RIG")]
@@ -30,6 +31,12 @@ pub struct Export {
     /// The camera, for --to camera-info and opencv, where the rig has several
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
+    /// What the base is called, for --to tf and static-transforms [default: the base link of the rig's URDF, else base]
+    #[arg(long, value_name = "NAME")]
+    base_frame: Option<String>,
+    /// What the tip is called, likewise [default: the tip link of the rig's URDF, else tip]
+    #[arg(long, value_name = "NAME")]
+    tip_frame: Option<String>,
     /// The file to write [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -85,13 +92,18 @@ impl Export {
                 "--camera is for --to camera-info and --to opencv: others take all cameras".into(),
             ));
         }
+        let names_frames = self.base_frame.is_some() || self.tip_frame.is_some();
+        if names_frames && !matches!(self.to, Format::Tf | Format::StaticTransforms) {
+            let problem = "--base-frame and --tip-frame are for --to tf and --to static-transforms";
+            return Err(Error::Unusable(problem.into()));
+        }
         match self.to {
             Format::Dh => rig.update_toml(text),
             Format::CameraInfo => to_camera_info(&self.intrinsics(rig)?),
             Format::Opencv => Ok(to_opencv(&self.intrinsics(rig)?)),
             Format::Kalibr => to_camchain(rig),
-            Format::Tf => to_tf(rig),
-            Format::StaticTransforms => to_static_transforms(rig),
+            Format::Tf => to_tf(&self.with_frames(rig)),
+            Format::StaticTransforms => to_static_transforms(&self.with_frames(rig)),
             Format::Urdf => {
                 let Some(path) = &self.urdf else {
                     return Err(Error::Unusable("--to urdf needs --urdf FILE, the URDF that the rig began as".into()));
@@ -99,6 +111,18 @@ impl Export {
                 to_urdf(rig, &read_text(path)?, &path.display().to_string())
             }
         }
+    }
+
+    /// The rig with base and tip called as they are elsewhere.
+    fn with_frames(&self, rig: &Rig) -> Rig {
+        let mut rig = rig.clone();
+        if self.base_frame.is_some() {
+            rig.robot.link.clone_from(&self.base_frame);
+        }
+        if let (Some(name), Some(last)) = (&self.tip_frame, rig.robot.joints.last_mut()) {
+            last.link = Some(name.clone());
+        }
+        rig
     }
 
     /// Those of the camera that was named, or of the only one.

@@ -5,6 +5,7 @@ use super::words::count;
 use crate::error::shipped;
 use crate::recording::is_in_another_order;
 use handeye::Error;
+use handeye::calibrate::put_on_tip;
 use handeye::recording::{Format, OpenOptions, Opened, RecordedCamera, Recording, Sample};
 use handeye::rig::{Rig, catalog, files_named, matches, replace_file};
 use std::fs::File;
@@ -36,8 +37,8 @@ pub fn read_rig(argument: &Path) -> Result<RigInput, Error> {
     }
     if is_recording(argument) {
         return Err(Error::Unusable(format!(
-            "{name}: that is a recording, and a rig is expected here; the rig comes first: handeye check RIG RECORDING (evaluate, \
-             infer and monitor likewise)"
+            "{name}: that is a recording, and a rig is expected here: handeye calibrate RECORDING --rig RIG, but handeye check RIG RECORDING \
+             (evaluate, infer and monitor likewise)"
         )));
     }
     let (rig, text) = Rig::read_with_text(argument)?;
@@ -109,6 +110,14 @@ pub fn read_with_notes(
     Ok((recording, notes))
 }
 
+/// Puts the cameras that only the recording has on the hand.
+pub fn eye_in_hand(rig: &mut Rig, recording: &Recording) -> Result<(), Error> {
+    if put_on_tip(rig, recording) {
+        return Ok(());
+    }
+    Err(Error::Unusable("the rig lists every camera with its parent, where --eye-in-hand has no effect".to_owned()))
+}
+
 /// Why a recording is not one of this rig.
 fn mismatch(input: &RigInput, recording: &Recording, new: &[String]) -> Option<String> {
     let RigInput { rig, name, .. } = input;
@@ -116,7 +125,10 @@ fn mismatch(input: &RigInput, recording: &Recording, new: &[String]) -> Option<S
     if ours != theirs && ours > 0 {
         let joints = recording.joints.join(", ");
         let named = if joints.is_empty() { joints } else { format!("; those of the recording: {joints}") };
-        return Some(format!("the recording has {}, the rig {name} has {ours}{named}", count(theirs, "joint")));
+        let has = |joint: &String| recording.joints.iter().any(|other| other.contains(joint));
+        let is_other = theirs > 0 && !rig.robot.joint_names().iter().any(has);
+        let names = if is_other { ", under other names: is it of this robot?" } else { "" };
+        return Some(format!("the recording has {}, the rig {name} has {ours}{names}{named}", count(theirs, "joint")));
     }
     let names = rig.robot.joint_names();
     if is_in_another_order(&recording.joints, &names) {

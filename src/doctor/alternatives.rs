@@ -1,8 +1,9 @@
 //! How else data with pixels may have come about: each a rig and a recording with one mistake undone.
 use super::{About, undo};
+use crate::calibrate::{list_cameras, list_features};
 use crate::chain::JointKind;
 use crate::recording::Recording;
-use crate::rig::{Camera, Feature, Parent, Rig};
+use crate::rig::{Parent, Rig};
 
 /// How joints in degrees are called, and what to change.
 pub(super) const DEGREES: (&str, &str) = ("joints are in degrees", "divide the readings of revolute joints by 57.2958");
@@ -54,9 +55,15 @@ pub(super) fn all(rig: &Rig, recording: &Recording) -> Vec<Alternative> {
             ..as_recorded(About::Joints, &name, &change)
         });
     }
+    let recording_alone = rig.cameras.is_empty() && rig.features.is_empty();
     all.extend(other_side(rig, recording).map(|(rig, declared, parent)| {
         let name = format!("cameras that are declared {declared} move as if they were not");
-        let change = format!("set the parent of the cameras to \"{parent}\", and that of the features to the other");
+        let other = if parent == "tip" { "world" } else { "tip" };
+        let mut change =
+            format!("set the parent of the cameras to \"{parent}\", and that of the features to \"{other}\"");
+        if parent == "tip" && recording_alone {
+            change += ", or say --eye-in-hand";
+        }
         Alternative { rig, ..as_recorded(About::Order, &name, &change) }
     }));
     all
@@ -86,16 +93,8 @@ fn units(rig: &Rig, as_recorded: impl Fn(About, &str, &str) -> Alternative) -> V
 /// The rig with cameras and features on the other side of the robot, what the cameras are declared to be, and what would do.
 fn other_side(rig: &Rig, recording: &Recording) -> Option<(Rig, &'static str, &'static str)> {
     let mut other = rig.clone();
-    for recorded in &recording.cameras {
-        if !other.cameras.iter().any(|camera| camera.name == recorded.name) {
-            other.cameras.push(Camera { name: recorded.name.clone(), ..Camera::default() });
-        }
-    }
-    for name in &recording.features {
-        if !other.features.iter().any(|feature| feature.name == *name) {
-            other.features.push(Feature { name: name.clone(), parent: Parent::Tip, xyz: None });
-        }
-    }
+    list_cameras(&mut other, recording);
+    list_features(&mut other, recording);
     let first = other.cameras.first()?.parent;
     let (declared, parent, to) = match first {
         Parent::World => ("in the world", "tip", Parent::Tip),

@@ -1,5 +1,5 @@
 //! Where the base and the cameras stand, as ROS takes it: static_transform_publisher, and the YAML of tf2_msgs/TFMessage.
-use super::unit::comment;
+use super::unit;
 use crate::Error;
 use crate::geometry::orientation;
 use crate::rig::{Parent, Rig};
@@ -16,7 +16,7 @@ struct Transform {
 /// One command line of static_transform_publisher (ROS 2) for the base, where its pose is known, and for each camera. A
 /// camera's frame is the optical one: z forward, x right, y down.
 ///
-/// Where the lengths are no metres, a comment above says so.
+/// Where the lengths are no metres, or the arm that was learned is not the one of its data sheet, comments above say so.
 ///
 /// Errors: [`Error::Unusable`] where a camera has no pose, and where there is neither a camera nor the pose of a base.
 pub fn to_static_transforms(rig: &Rig) -> Result<String, Error> {
@@ -52,6 +52,14 @@ pub fn to_tf(rig: &Rig) -> Result<String, Error> {
         );
     }
     Ok(text)
+}
+
+/// What has to be known of the transforms, as comment lines that begin with `#`.
+fn comment(rig: &Rig) -> String {
+    let is_of_arm = |path: &String| path.starts_with("robot.joints.");
+    let is_learned = rig.fit.as_ref().is_some_and(|fit| fit.sd.keys().any(is_of_arm));
+    let arm = "# of the arm as it was learned: on one with the geometry of its data sheet they are off (--to urdf writes this one)\n";
+    unit::comment(rig) + if is_learned { arm } else { "" }
 }
 
 fn transforms(rig: &Rig) -> Result<Vec<Transform>, Error> {

@@ -28,7 +28,7 @@ impl Folder {
         fs::read_to_string(self.0.join(name)).unwrap()
     }
 
-    fn run(&self, arguments: &str) -> Output {
+    pub fn run(&self, arguments: &str) -> Output {
         let arguments = arguments.split_whitespace();
         Command::new(env!("CARGO_BIN_EXE_handeye")).args(arguments).current_dir(&self.0).output().unwrap()
     }

@@ -1,6 +1,8 @@
 //! Learning from the command line: a rig file that every other command reads, the same bytes every time, and its report.
 use crate::cli::Folder;
-use handeye::rig::{Model, Rig, catalog};
+use crate::learning::variants;
+use handeye::rig::{Model, Parent, Rig, catalog};
+use handeye::simulate::{SimulateOptions, simulate};
 use serde_json::Value;
 
 fn json(folder: &Folder, arguments: &str) -> Value {
@@ -41,6 +43,33 @@ fn what_is_learned_from_nothing_predicts_what_it_has_not_seen() {
     let judged = json(&folder, "evaluate learned.toml fresh.jsonl");
     assert!(judged["rms_px"].as_f64().unwrap() < 1.1 * FLOOR, "{} px", judged["rms_px"]);
     assert_eq!(json(&folder, "check learned.toml fresh.jsonl")["complete"], true);
+}
+
+/// What a wrist camera needs besides the robot's name: without it the misfit says so, and `check` does.
+#[test]
+fn a_camera_on_the_hand_needs_one_word() {
+    let folder = Folder::new("eye-in-hand");
+    let rig = variants::on_hand(1, 4);
+    let options = SimulateOptions { samples: 40, ..SimulateOptions::default() };
+    simulate(&rig, &options).unwrap().recording.write(&folder.path().join("rec.jsonl")).unwrap();
+    let arm = Rig { cameras: Vec::new(), features: Vec::new(), ..rig };
+    arm.write(&folder.path().join("arm.toml"), None).unwrap();
+
+    let report = json(&folder, "calibrate rec.jsonl --rig arm.toml --eye-in-hand -o learned.toml");
+    assert!(report["rms_px"].as_f64().unwrap() < 1.1 * FLOOR, "{} px", report["rms_px"]);
+    let learned = Rig::parse(&folder.read("learned.toml"), "learned.toml").unwrap();
+    assert!(learned.cameras.iter().all(|camera| camera.parent == Parent::Tip));
+    assert!(learned.features.len() == 12 && learned.features.iter().all(|f| f.parent == Parent::World));
+
+    let output = folder.run("calibrate rec.jsonl --rig arm.toml -o wrong.toml");
+    let told = String::from_utf8([output.stdout, output.stderr].concat()).unwrap();
+    assert!(told.contains("on the hand, say --eye-in-hand"), "{told}");
+    let (out, _) = folder.expect(0, "check arm.toml rec.jsonl");
+    assert!(out.contains("move as if they were not") && out.contains("or say --eye-in-hand"), "{out}");
+    let (out, _) = folder.expect(0, "check arm.toml rec.jsonl --eye-in-hand");
+    assert!(out.contains("no mistake"), "{out}");
+    let (_, err) = folder.expect(2, "calibrate rec.jsonl --rig learned.toml --eye-in-hand -o x.toml");
+    assert!(err.contains("--eye-in-hand has no effect"), "{err}");
 }
 
 #[test]

@@ -94,7 +94,7 @@ fn what_cannot_be_inferred_is_said_in_its_line_or_refused() {
     let (_, complaint) = folder.expect(2, "infer ur5 some.jsonl --actions");
     assert!(complaint.contains("--actions needs samples with `joint_action`"), "{complaint}");
     let (_, complaint) = folder.expect(2, "infer panda some.jsonl");
-    assert!(complaint.contains("the recording has 6 joints, the rig panda has 7"), "{complaint}");
+    assert!(complaint.contains("the recording has 6 joints, the rig panda has 7, under other names"), "{complaint}");
     folder.write("partial.toml", "[[cameras]]\nname = \"left\"\nfx = 600.0\n");
     let (_, complaint) = folder.expect(2, "infer partial.toml some.jsonl");
     assert!(complaint.contains("the rig is not complete") && complaint.contains("cameras.left.pose"), "{complaint}");

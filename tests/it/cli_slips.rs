@@ -42,7 +42,7 @@ fn a_recording_in_the_place_of_the_rig_is_told_with_the_right_order() {
         for command in ["check", "evaluate", "infer", "monitor"] {
             let (_, err) = folder.expect(2, &format!("{command} {recording} ur5"));
             let expected = format!(
-                "error: {recording}: that is a recording, and a rig is expected here; the rig comes first: handeye check RIG RECORDING"
+                "error: {recording}: that is a recording, and a rig is expected here: handeye calibrate RECORDING --rig RIG, but handeye check RIG RECORDING"
             );
             assert!(err.starts_with(&expected), "{command}: {err}");
         }

@@ -100,6 +100,7 @@ fn export_writes_every_format_from_the_command_line() {
         ("export ur5 --to tf --camera left", "--camera is for"),
         ("export ur5 --to dh --urdf absent", "--urdf is for --to urdf"),
         ("export ur5 --to urdf", "--urdf"),
+        ("export ur5 --to dh --tip-frame tool0", "--base-frame and --tip-frame are for --to tf"),
         ("export ur5 --to urdf --urdf absent", "absent: "),
         ("export absent.toml --to tf", "absent.toml: "),
     ] {
@@ -109,6 +110,21 @@ fn export_writes_every_format_from_the_command_line() {
     let camera = &catalog::rig("ur5").unwrap().cameras[0];
     let (text, _) = folder.expect(0, "export ur5 --to camera-info --camera left");
     assert!(same(&to_intrinsics(camera).unwrap(), &read_intrinsics(&text, "x", None).unwrap()));
+}
+
+#[test]
+fn frames_are_called_as_they_are_elsewhere_and_an_arm_that_was_learned_is_said_to_be_one() {
+    let folder = Folder::new("export-frames");
+    let mut rig = ur5_with_a_camera_on_the_hand();
+    rig.write(&folder.path().join("arm.toml"), None).unwrap();
+    let (out, _) = folder.expect(0, "export arm.toml --to static-transforms --base-frame ur_base --tip-frame flange");
+    let ends = ["--frame-id world --child-frame-id ur_base", "--frame-id flange --child-frame-id 'it'\\''s a hand'"];
+    assert!(ends.iter().all(|end| out.lines().any(|line| line.ends_with(end))) && !out.contains('#'), "{out}");
+    let (out, _) = folder.expect(0, "export arm.toml --to tf --base-frame ur_base --tip-frame flange");
+    assert!(out.contains("child_frame_id: \"ur_base\"") && out.contains("frame_id: \"flange\""), "{out}");
+    rig.fit = Some(Fit { sd: [("robot.joints.elbow.a".to_owned(), vec![1e-4])].into(), ..Fit::default() });
+    assert!(to_static_transforms(&rig).unwrap().starts_with("# of the arm as it was learned"));
+    assert!(to_tf(&rig).unwrap().starts_with("# of the arm as it was learned"));
 }
 
 #[test]
