@@ -17,13 +17,14 @@ use std::path::PathBuf;
 ///
 /// The positions that shrink the uncertainty of the tip's position most, within the joints' limits (else the range that they were
 /// in while the rig was learned) and with at least half of the features in view of a camera, on the side on which they were seen.
-/// Nothing is known of obstacles: look at every position before the robot goes there. Without --with it is a ranking: the standard
+/// Nothing is known of obstacles but what --above and --near say: look at every position before the robot goes there. Without --with it is a ranking: the standard
 /// deviations of a rig do not say what moves together, and every feature counts as seen from all sides.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   handeye suggest learned.toml --count 5 --with motions.jsonl -o next.jsonl
   handeye suggest arm.toml --with motions.jsonl --rig ur5      as calibrate motions.jsonl --rig ur5 -o arm.toml learned it
+  handeye suggest learned.toml --with motions.jsonl --near --above 0.05      near where it was, and 5 cm above the table
   handeye suggest learned.toml                                 a ranking, where the recording is lost")]
 pub struct Suggest {
     /// A rig file that calibrate wrote
@@ -38,6 +39,12 @@ pub struct Suggest {
     /// What was known when it was learned: the --rig of calibrate [default: nothing but what [estimate] holds or knows roughly]
     #[arg(long, value_name = "RIG")]
     rig: Option<PathBuf>,
+    /// Stay within the ranges that the joints were in while the rig was learned, and a quarter of these ranges more
+    #[arg(long)]
+    near: bool,
+    /// Height in the world (z) that no link, and nothing on the arm, goes below
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    above: Option<f64>,
     /// Seed of every random choice: the same seed gives the same positions
     #[arg(long, value_name = "S", default_value_t = SuggestOptions::default().seed)]
     seed: u64,
@@ -64,7 +71,7 @@ impl Suggest {
             of_rigs.for_each(|rig| inputs.extend([rig.clone()].into_iter().chain(files_named(rig))));
             check_output(output, &inputs)?;
         }
-        let options = SuggestOptions { count: self.count, seed: self.seed };
+        let options = SuggestOptions { count: self.count, seed: self.seed, near: self.near, above: self.above };
         let known = known.map(|known| with_lengths(known.rig, &input.rig));
         let suggestion = suggest(&input.rig, recording.as_ref(), known.as_ref(), &options)?;
         let mut answer = Answer::new(text(&input.rig, &suggestion), json(&suggestion));

@@ -55,7 +55,7 @@ impl<'a> Motions<'a> {
             let mut joints = self.near(None, 1.0);
             let mut shortfall = self.shortfall(&joints);
             for trial in 1..DRAWS + STEPS {
-                if shortfall.features == 0 {
+                if shortfall.missing == 0 {
                     self.found += 1;
                     return Ok(joints);
                 }
@@ -78,7 +78,7 @@ impl<'a> Motions<'a> {
         let (mut joints, mut best) = (from.to_vec(), score(from));
         for step in 0..CLIMB {
             let other = self.near(Some(&joints), WIDTHS[step % WIDTHS.len()]);
-            if self.shortfall(&other).features > 0 {
+            if self.shortfall(&other).missing > 0 {
                 continue;
             }
             let there = score(&other);
@@ -111,7 +111,7 @@ impl<'a> Motions<'a> {
     }
 
     fn failure(&self) -> Error {
-        let Views { need: Need { per_camera, in_one, in_total }, model, .. } = self.views;
+        let Views { need: Need { per_camera, in_one, in_total }, model, floor, .. } = self.views;
         let n_features = model.features.len();
         let blind: Vec<String> = self
             .camera_names
@@ -126,7 +126,8 @@ impl<'a> Motions<'a> {
             (*in_one, format!("a camera has {in_one} features in view")),
             (*in_total, format!("{in_total} features are in view")),
         ];
-        let needed = needs.into_iter().filter(|(count, _)| *count > 0).map(|(_, words)| words);
+        let height = floor.map(|floor| format!("nothing of the arm is below {floor} m"));
+        let needed = needs.into_iter().filter(|(count, _)| *count > 0).map(|(_, words)| words).chain(height);
         let needed = needed.collect::<Vec<_>>().join(" and ");
         Error::NotEnoughData(format!(
             "{} of {} random positions within the joints' ranges are such that {needed}: {which}; cameras that look at \

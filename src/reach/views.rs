@@ -1,7 +1,7 @@
 //! What the cameras of a complete rig see of its features.
 use crate::Error;
 use crate::recording::{Detection, PointDetection};
-use crate::rig::{Camera, Model, Rig};
+use crate::rig::{Camera, Model, Parent, Rig};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
 use std::f64::consts::FRAC_PI_4;
@@ -15,6 +15,8 @@ pub(crate) struct Views<'a> {
     pub need: Need,
     /// For every feature, in its parent's frame, where cameras have to be to see it; `None` where that is everywhere.
     cones: Vec<Option<Cone>>,
+    /// Height in the world below which nothing of the arm is to be [m].
+    pub floor: Option<f64>,
 }
 
 /// Directions about an axis.
@@ -45,12 +47,12 @@ pub(crate) struct Need {
     pub in_total: usize,
 }
 
-/// By how much a position misses what has to be in view; ordered, so that a walk can descend it.
+/// By how much a position misses what is asked of it; ordered, so that a walk can descend it.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub(crate) struct Shortfall {
-    /// Features that are missing.
-    pub features: usize,
-    /// Mean angle between the optical axes and the features out of view [rad]: where to go while none is seen.
+    /// Features that are missing, and one more where the arm is too low.
+    pub missing: usize,
+    /// Mean angle between the optical axes and the features out of view [rad], and the depth below the floor [m]: where to go while none is seen.
     angle: f64,
 }
 
@@ -62,7 +64,7 @@ impl<'a> Views<'a> {
             }
         }
         let depth = rig.cameras.iter().map(|camera| camera.depth).collect();
-        Ok(Views { model, depth, sizes: sizes(rig)?, need, cones: vec![None; rig.features.len()] })
+        Ok(Views { model, depth, sizes: sizes(rig)?, need, cones: vec![None; rig.features.len()], floor: None })
     }
 
     /// The same where features are seen from the side from which they were seen before, such as the front of a board.
@@ -74,6 +76,25 @@ impl<'a> Views<'a> {
         });
         self.cones = sides.iter().map(|sides| Cone::around(sides)).collect();
         self
+    }
+
+    /// The same where nothing of the arm is to be below a height in the world [m]: no link that can move up or down, nor what is on the arm.
+    pub fn above(mut self, floor: Option<f64>) -> Self {
+        self.floor = floor;
+        self
+    }
+
+    /// How far the lowest point of the arm is below the floor [m]; 0 where none is.
+    fn depth_below(&self, links: &[Pose]) -> f64 {
+        let Some(floor) = self.floor else { return 0.0 };
+        let Model { cameras, features, .. } = self.model;
+        let cameras = cameras.iter().map(|camera| (camera.parent, camera.pose.translation));
+        let carried = cameras.chain(features.iter().map(|feature| (feature.parent, feature.xyz)));
+        let carried = carried.filter(|(parent, _)| *parent != Parent::World);
+        let carried = carried.map(|(parent, point)| self.model.carrier(parent, links).transform(&point).z);
+        // The first link turns in its place, or slides along the base.
+        let heights = links.iter().skip(2).map(|link| link.translation.z).chain(carried);
+        heights.map(|height| floor - height).fold(0.0, f64::max)
     }
 
     /// Direction of a camera from a feature, in the feature's parent's frame.
@@ -108,7 +129,7 @@ impl<'a> Views<'a> {
         .collect()
     }
 
-    /// By how much a position misses what has to be in view. `in_view`: how many features each camera sees.
+    /// By how much a position misses what is asked of it. `in_view`: how many features each camera sees.
     pub fn shortfall(&self, joints: &[f64], in_view: &mut [usize]) -> Shortfall {
         let links = self.model.links(joints);
         let (mut angle, mut n_hidden) = (0.0, 0);
@@ -128,7 +149,11 @@ impl<'a> Views<'a> {
         let per_camera: usize = in_view.iter().map(|&seen| need.per_camera.saturating_sub(seen)).sum();
         let in_one = need.in_one.saturating_sub(in_view.iter().copied().max().unwrap_or(0));
         let in_total = need.in_total.saturating_sub(in_view.iter().sum());
-        Shortfall { features: per_camera.max(in_one).max(in_total), angle: angle / f64::from(n_hidden.max(1)) }
+        let below = self.depth_below(&links);
+        Shortfall {
+            missing: per_camera.max(in_one).max(in_total) + usize::from(below > 0.0),
+            angle: angle / f64::from(n_hidden.max(1)) + below,
+        }
     }
 
     /// Where a camera sees a feature, if it does.

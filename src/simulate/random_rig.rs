@@ -133,5 +133,5 @@ fn is_viewable(rig: &Rig, positions: &[Vec<f64>]) -> bool {
     let model = Model::new(rig).expect("the rig is complete");
     let views = Views::new(rig, &model, SimulateOptions::default().need(rig)).expect("every camera has a size");
     let mut in_view = vec![0; rig.cameras.len()];
-    positions.iter().filter(|joints| views.shortfall(joints, &mut in_view).features == 0).count() >= VIEWABLE
+    positions.iter().filter(|joints| views.shortfall(joints, &mut in_view).missing == 0).count() >= VIEWABLE
 }

@@ -230,6 +230,44 @@ fn without_limits_joints_stay_where_they_were_while_the_rig_was_learned() {
     }
 }
 
+/// Where nothing is known of obstacles, a person knows the table, and where the arm has been before.
+#[test]
+fn positions_stay_above_the_table_and_near_where_the_arm_has_been() {
+    let truth = variants::ur5(2);
+    let arm = Rig { cameras: Vec::new(), features: Vec::new(), ..truth.clone() };
+    let recording = record(&truth, 20, 2);
+    let learned = learn(&arm, &recording).unwrap().rig;
+    let model = Model::new(&learned).unwrap();
+    let lowest = |joints: &[f64]| {
+        let links = model.links(joints);
+        let carried = model.features.iter().map(|feature| links[6].transform(&feature.xyz).z);
+        links[2..].iter().map(|link| link.translation.z).chain(carried).fold(f64::INFINITY, f64::min)
+    };
+    let ask = |near, above| {
+        let options = SuggestOptions { count: 4, near, above, ..SuggestOptions::default() };
+        suggest(&learned, Some(&recording), Some(&arm), &options)
+    };
+    let outside = |suggestion: &Suggestion| {
+        let ranges = &learned.fit.as_ref().unwrap().joints;
+        let all = suggestion.samples.iter().flat_map(|sample| sample.joints.iter().zip(ranges));
+        all.filter(|(value, [least, most])| {
+            let more = 0.25 * (most - least) + 1e-9;
+            !(least - more..=most + more).contains(*value)
+        })
+        .count()
+    };
+    let heights = |suggestion: &Suggestion| -> Vec<f64> {
+        suggestion.samples.iter().map(|sample| lowest(&sample.joints)).collect()
+    };
+    let (free, held) = (ask(false, None).unwrap(), ask(true, Some(0.2)).unwrap());
+    let lows = heights(&free);
+    assert!(lows.iter().any(|low| *low < 0.2), "the fixture is never low: {lows:?}");
+    assert!(heights(&held).iter().all(|low| *low >= 0.2 - 1e-9), "{:?}", heights(&held));
+    assert_eq!(outside(&held), 0);
+    let error = ask(false, Some(5.0)).unwrap_err().to_string();
+    assert!(error.contains("nothing of the arm is below 5 m"), "{error}");
+}
+
 /// A UR5 turns each joint twice round; where it is sent, it need not unwind first.
 #[test]
 fn joints_are_not_sent_a_whole_turn_away() {
@@ -254,7 +292,10 @@ fn the_same_seed_gives_the_same_positions_on_any_number_of_threads() {
     let learned = learn(&nothing(&truth), &recording).unwrap().rig;
     let on = |threads, seed| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| suggest(&learned, Some(&recording), None, &SuggestOptions { count: 3, seed }).unwrap())
+        pool.install(|| {
+            suggest(&learned, Some(&recording), None, &SuggestOptions { count: 3, seed, ..SuggestOptions::default() })
+                .unwrap()
+        })
     };
     assert_eq!(on(1, 7), on(3, 7));
     assert_ne!(on(1, 7).samples, on(1, 8).samples);

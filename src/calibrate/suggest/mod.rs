@@ -47,11 +47,15 @@ pub struct SuggestOptions {
     pub count: usize,
     /// Seed of every random choice: the same seed gives the same positions, bit for bit.
     pub seed: u64,
+    /// Joints stay within the ranges that they were in while the rig was learned, and a quarter of these ranges more to both sides.
+    pub near: bool,
+    /// Height in the world (z) below which no link, and nothing on the arm, is to be [m].
+    pub above: Option<f64>,
 }
 
 impl Default for SuggestOptions {
     fn default() -> Self {
-        SuggestOptions { count: 5, seed: 1 }
+        SuggestOptions { count: 5, seed: 1, near: false, above: None }
     }
 }
 
@@ -97,7 +101,7 @@ pub struct SuggestedSample {
 ///
 /// Positions are within the limits of the joints, else within the range that they were in while the rig was learned, and have at
 /// least half of the features in view of a camera; with the recording, from the side from which they were seen. The greedy choice
-/// minimises the expected variance of the tip over such positions (A-optimality). Nothing is known of obstacles.
+/// minimises the expected variance of the tip over such positions (A-optimality). Nothing is known of obstacles but what the options say.
 ///
 /// Errors: [`Error::Unusable`] where the rig was not learned, or nothing of it that moves the tip was, or rig and recording do not fit
 /// together; [`Error::NotEnoughData`] where the recording leaves something open, or hardly any position has the features in view.
@@ -144,8 +148,10 @@ pub fn suggest(
         let used = setup.observations.iter().zip(&verdict.active).filter(|(_, active)| **active).map(|(seen, _)| seen);
         views = views.facing(used.map(|seen| (seen.camera, seen.feature, &state.joints[seen.sample][..])));
     }
+    let views = views.above(options.above);
     let sight = Sight::new(&honest, &uncertainty.numbers, &state, &verdict, &views, thinned);
-    let mut motions = Motions::new(&setup.rig, &views, ranges(&setup.rig, fit_of)?, stream(options.seed, POSITIONS));
+    let mut motions =
+        Motions::new(&setup.rig, &views, ranges(&setup.rig, fit_of, options.near)?, stream(options.seed, POSITIONS));
     let pool = (0..POOL).map(|_| motions.draw()).collect::<Result<Vec<_>, _>>()?;
     let tips: Vec<DMatrix<f64>> = pool.iter().map(|joints| sight.tip(joints)).collect();
     let with_priors = median_deviation(&tips, &uncertainty.sigma);
@@ -169,10 +175,23 @@ fn need(rig: &Rig) -> Need {
     Need { in_one: n_features.div_ceil(2), in_total: n_features.min(IN_TOTAL), ..Need::default() }
 }
 
-/// Where every joint may be: within its limits, or, where it has none, within the range that it was in while the rig was learned.
-fn ranges(rig: &Rig, fit: &Fit) -> Result<Vec<[f64; 2]>, Error> {
+/// How much of its range a joint may leave it by, where it is to stay near.
+const NEAR: f64 = 0.25;
+
+/// Where every joint may be: within its limits, or, where it has none, within the range that it was in while the rig was learned; within
+/// the limits and near that range where `near` says so.
+fn ranges(rig: &Rig, fit: &Fit, near: bool) -> Result<Vec<[f64; 2]>, Error> {
     let joints = rig.robot.joints.iter().enumerate();
-    joints.map(|(index, joint)| range(joint, fit.joints.get(index).copied())).collect()
+    joints
+        .map(|(index, joint)| {
+            let seen = fit.joints.get(index).copied();
+            let [lower, upper] = range(joint, seen)?;
+            let [least, most] = seen.filter(|_| near).unwrap_or([lower, upper]);
+            let more = if near { NEAR * (most - least) } else { 0.0 };
+            // What was learned from was within the limits, or these are not the arm's.
+            Ok([lower.max(least - more).min(most), upper.min(most + more).max(least)])
+        })
+        .collect()
 }
 
 /// Brings revolute joints back by whole turns to near where they were while the rig was learned, where their limits permit it.

@@ -25,7 +25,7 @@ pub(super) fn stand_in(learned: &Rig, fit: &Fit, seed: u64) -> Result<Data<'stat
     let views = Views::new(learned, &model, need(learned))?;
     let is_range = |[least, most]: &[f64; 2]| least <= most && (most - least).is_finite();
     let is_known = fit.joints.len() == learned.robot.joints.len() && fit.joints.iter().all(is_range);
-    let ranges = if is_known { fit.joints.clone() } else { ranges(learned, fit)? };
+    let ranges = if is_known { fit.joints.clone() } else { ranges(learned, fit, false)? };
     let mut motions = Motions::new(learned, &views, ranges, stream(seed, STAND_IN));
     let samples = fit.samples.clamp(1, MOST);
     let mut recording = Recording {
