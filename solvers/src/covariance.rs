@@ -41,25 +41,14 @@ impl<'a> Covariance<'a> {
     /// The same with the solver of a minimiser, which saves laying everything out again.
     pub fn with(graph: &'a Graph, mut solver: Solver) -> Result<Self, Error> {
         solver.fit(graph);
-        let Solver { workspace, linear, buffers } = &mut solver;
-        if buffers.b.is_empty() {
-            return Err(Error::NothingFree);
-        }
-        let layout = &workspace.layout;
+        let layout = &solver.workspace.layout;
         let is_open = |node: usize| graph.nodes[node].role == Role::Free && layout.places[node].active > 0;
-        if (0..graph.nodes.len()).any(|node| is_open(node) && layout.column_of(node as u32).is_none()) {
+        let is_untouched = |node: usize| is_open(node) && layout.column_of(node as u32).is_none();
+        if layout.columns > 0 && (0..graph.nodes.len()).any(is_untouched) {
             return Err(Error::Singular);
         }
-        let cost = workspace.linearize(graph, &graph.values, Take::All);
-        if !cost.is_finite() {
-            return Err(graph.first_not_finite(cost));
-        }
-        workspace.diagonal(&mut buffers.diagonal);
-        buffers.damping.fill(0.0);
-        if !linear.factorize(workspace, &buffers.damping) || smallest(linear.as_mut(), &buffers.diagonal) < OPEN {
-            return Err(Error::Singular);
-        }
-        let y = vec![0.0; buffers.b.len()];
+        factorize(graph, &mut solver)?;
+        let y = vec![0.0; solver.buffers.b.len()];
         Ok(Covariance { graph, solver, y })
     }
 
@@ -95,6 +84,24 @@ impl<'a> Covariance<'a> {
     pub fn into_solver(self) -> Solver {
         self.solver
     }
+}
+
+/// Linearises where the nodes are now, and factorises H. [`Error::Singular`] where the factors leave some direction open.
+pub(crate) fn factorize(graph: &Graph, solver: &mut Solver) -> Result<(), Error> {
+    let Solver { workspace, linear, buffers } = solver;
+    if buffers.b.is_empty() {
+        return Err(Error::NothingFree);
+    }
+    let cost = workspace.linearize(graph, &graph.values, Take::All);
+    if !cost.is_finite() {
+        return Err(graph.first_not_finite(cost));
+    }
+    workspace.diagonal(&mut buffers.diagonal);
+    buffers.damping.fill(0.0);
+    if !linear.factorize(workspace, &buffers.damping) || smallest(linear.as_mut(), &buffers.diagonal) < OPEN {
+        return Err(Error::Singular);
+    }
+    Ok(())
 }
 
 fn columns(layout: &Layout, of: &[(u32, DMatrix<f64>)]) -> Vec<Range<usize>> {

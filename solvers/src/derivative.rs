@@ -1,6 +1,6 @@
 //! Derivatives of any node's step with respect to the columns of the system.
-use crate::graph::{Graph, Role};
-use crate::jacobian::{Columns, Coordinates, Jacobian};
+use crate::graph::{FactorKey, Graph, Role};
+use crate::jacobian::{Columns, Coordinates, Jacobian, width};
 use crate::layout::Layout;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -42,34 +42,57 @@ impl<'a> Derivative<'a> {
         }
     }
 
+    /// A factor's residual with its noise and loss (see [`FactorPool::linearize`]), and its derivatives as those of a node.
+    pub fn of_factor(&mut self, factor: FactorKey) -> (Vec<f64>, Vec<(u32, DMatrix<f64>)>) {
+        let (graph, place) = (self.graph, factor.place as usize);
+        let pool = &graph.factors[factor.pool as usize];
+        self.chained(pool.nodes(place), |x, columns| pool.linearize(place, graph, x, columns))
+    }
+
     fn derived(&mut self, derived: u32) -> Vec<(u32, DMatrix<f64>)> {
-        let derived = &self.graph.derived[derived as usize];
-        let pool = &self.graph.functions[derived.pool as usize];
-        let parents = pool.nodes(derived.place as usize);
-        let inputs: Vec<Vec<f64>> = parents.iter().map(|&parent| self.graph.stored(parent)).collect();
+        let graph = self.graph;
+        let derived = &graph.derived[derived as usize];
+        let pool = &graph.functions[derived.pool as usize];
+        let place = &graph.nodes[derived.node as usize];
+        let evaluate = |x: &[&[f64]], columns: &[Columns<'_>]| {
+            let width = width(columns);
+            let (mut y, mut g) = (vec![0.0; place.ambient], vec![0.0; place.tangent * width]);
+            let jacobian = &mut Jacobian { data: &mut g, columns, width };
+            pool.evaluate(derived.place as usize, x, &mut y, Some(jacobian));
+            (y, g)
+        };
+        self.chained(pool.nodes(derived.place as usize), evaluate).1
+    }
+
+    /// The chain rule: what is evaluated on some nodes, and its derivatives through them.
+    fn chained(
+        &mut self,
+        nodes: &[u32],
+        evaluate: impl FnOnce(&[&[f64]], &[Columns<'_>]) -> (Vec<f64>, Vec<f64>),
+    ) -> (Vec<f64>, Vec<(u32, DMatrix<f64>)>) {
+        let inputs: Vec<Vec<f64>> = nodes.iter().map(|&node| self.graph.stored(node)).collect();
         let x: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
-        let mut width = 0;
-        let columns: Vec<Columns<'_>> = parents
+        let mut start = 0;
+        let columns: Vec<Columns<'_>> = nodes
             .iter()
-            .map(|&parent| {
-                let len = self.graph.nodes[parent as usize].tangent;
-                width += len;
-                Columns { start: width - len, len, active: len, free: Coordinates::All }
+            .map(|&node| {
+                let len = self.graph.nodes[node as usize].tangent;
+                start += len;
+                let is_constant = self.layout.places[node as usize].active == 0;
+                let (active, free) = if is_constant { (0, Coordinates::None) } else { (len, Coordinates::All) };
+                Columns { start: start - len, len, active, free }
             })
             .collect();
-        let place = &self.graph.nodes[derived.node as usize];
-        let (mut y, mut g) = (vec![0.0; place.ambient], vec![0.0; place.tangent * width]);
-        let jacobian = &mut Jacobian { data: &mut g, columns: &columns, width };
-        pool.evaluate(derived.place as usize, &x, &mut y, Some(jacobian));
-        let g = DMatrix::from_row_slice(place.tangent, width, &g);
+        let (result, g) = evaluate(&x, &columns);
+        let g = DMatrix::from_row_slice(g.len() / start, start, &g);
         let mut total: BTreeMap<u32, DMatrix<f64>> = BTreeMap::new();
-        for (&parent, columns) in parents.iter().zip(&columns) {
+        for (&node, columns) in nodes.iter().zip(&columns) {
             let g = g.columns(columns.start, columns.len);
-            for (node, inner) in self.of(parent) {
+            for (node, inner) in self.of(node) {
                 let part = g * inner;
                 total.entry(node).and_modify(|sum| *sum += &part).or_insert(part);
             }
         }
-        total.into_iter().collect()
+        (result, total.into_iter().collect())
     }
 }

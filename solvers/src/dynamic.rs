@@ -1,7 +1,7 @@
 //! Residuals whose size and arguments are known at run time only, such as those that another language computes.
 use crate::accumulate::{Arguments, Run, Want};
 use crate::graph::Node;
-use crate::jacobian::{Jacobian, compact};
+use crate::jacobian::{Columns, Jacobian, compact, width};
 use crate::pool::{FactorPool, MOST, grown, squared};
 use crate::{Error, FactorKey, Graph, Key, Loss};
 use std::any::{Any, TypeId};
@@ -103,6 +103,24 @@ impl Placed {
         r.iter_mut().zip(&self.weights).for_each(|(r, weight)| *r *= weight);
     }
 
+    /// Writes √ρ' r/σ and its Jacobian, and returns ρ.
+    fn linearize(&self, nodes: &[Node], x: &[&[f64]], r: &mut [f64], jacobian: Jacobian<'_>, graduation: f64) -> f64 {
+        let Jacobian { data, columns, width } = jacobian;
+        let mut jacobian = Jacobian { data: &mut *data, columns, width };
+        if !self.factor.linearize(x, r, &mut jacobian) {
+            self.differences(nodes, x, r, &mut jacobian);
+        }
+        compact(data, width, columns);
+        self.whiten(r);
+        let (rho, slope) = self.loss.evaluate(squared(r), graduation);
+        let root = slope.sqrt();
+        r.iter_mut().for_each(|r| *r *= root);
+        for (row, weight) in data.chunks_exact_mut(width).zip(&self.weights) {
+            row.iter_mut().for_each(|x| *x *= weight * root);
+        }
+        rho
+    }
+
     /// The residual, and its Jacobian by central differences.
     fn differences(&self, nodes: &[Node], x: &[&[f64]], r: &mut [f64], jacobian: &mut Jacobian<'_>) {
         self.factor.residual(x, r);
@@ -157,6 +175,13 @@ impl FactorPool for DynamicPool {
         self.placed[place].loss
     }
 
+    fn linearize(&self, place: usize, graph: &Graph, x: &[&[f64]], columns: &[Columns<'_>]) -> (Vec<f64>, Vec<f64>) {
+        let (placed, width) = (&self.placed[place], width(columns));
+        let (mut r, mut data) = (vec![0.0; placed.weights.len()], vec![0.0; placed.weights.len() * width]);
+        placed.linearize(&graph.nodes, x, &mut r, Jacobian { data: &mut data, columns, width }, graph.graduation);
+        (r, data)
+    }
+
     fn is_prior(&self) -> bool {
         false
     }
@@ -181,19 +206,8 @@ impl FactorPool for DynamicPool {
             }
             let width = arguments.width;
             let data = batch.room(run, &placed.nodes, &arguments, rows);
-            let mut jacobian = Jacobian { data: &mut *data, columns, width };
-            if !placed.factor.linearize(x, r, &mut jacobian) {
-                placed.differences(nodes, x, r, &mut jacobian);
-            }
-            compact(data, width, columns);
-            placed.whiten(r);
-            let (rho, slope) = placed.loss.evaluate(squared(r), run.graduation);
-            run.cost += 0.5 * rho;
-            let root = slope.sqrt();
-            r.iter_mut().for_each(|r| *r *= root);
-            for (row, weight) in data.chunks_exact_mut(width).zip(&placed.weights) {
-                row.iter_mut().for_each(|x| *x *= weight * root);
-            }
+            let jacobian = Jacobian { data, columns, width };
+            run.cost += 0.5 * placed.linearize(nodes, x, r, jacobian, run.graduation);
             batch.push(&placed.nodes, &arguments, r);
             // The next may be of another size.
             batch.flush(run);

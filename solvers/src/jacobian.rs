@@ -55,6 +55,11 @@ impl Jacobian<'_> {
     }
 }
 
+/// Columns of a Jacobian on all arguments.
+pub(crate) fn width(columns: &[Columns<'_>]) -> usize {
+    columns.iter().map(|argument| argument.len).sum()
+}
+
 /// Forward mode in passes of [`LANES`] directions: `call` computes `output` from the arguments over dual numbers, and the
 /// derivatives of its entries become the rows of the Jacobian.
 #[inline]

@@ -1,6 +1,7 @@
 //! Factors and functions of one type side by side, behind one call per run of them.
 use crate::accumulate::{Arguments, Run, Want};
-use crate::jacobian::{Jacobian, compact, forward};
+use crate::graph::Graph;
+use crate::jacobian::{Columns, Jacobian, compact, forward, width};
 use crate::scalar::Dual;
 use crate::{Factor, Function, Loss, Noise, Variable, Variables};
 use std::any::{Any, TypeId};
@@ -16,6 +17,8 @@ pub(crate) trait FactorPool: Any + Send + Sync {
     /// The whitened residual r/σ.
     fn residual(&self, place: usize, x: &[&[f64]]) -> Vec<f64>;
     fn loss(&self, place: usize) -> Loss;
+    /// √ρ' r/σ, of which the normal equations are made, and its Jacobian by rows, where free columns come first in each argument.
+    fn linearize(&self, place: usize, graph: &Graph, x: &[&[f64]], columns: &[Columns<'_>]) -> (Vec<f64>, Vec<f64>);
     /// True for Gaussian priors, which are not data.
     fn is_prior(&self) -> bool;
     /// Adds the cost of a range of factors and, if wanted, their normal equations.
@@ -56,6 +59,24 @@ impl<F: Factor<M>, const M: usize> Pool<F, M> {
     }
 }
 
+impl<F: Factor<M>, const M: usize> Placed<F, M> {
+    /// Writes the Jacobian of √ρ' r/σ, and returns that and ρ.
+    #[inline]
+    fn linearize(&self, x: &[&[f64]], jacobian: Jacobian<'_>, graduation: f64) -> ([f64; M], f64) {
+        let Jacobian { data, columns, width } = jacobian;
+        let mut r = self.factor.evaluate(x, Some(&mut Jacobian { data: &mut *data, columns, width }));
+        compact(data, width, columns);
+        self.noise.whiten(&mut r, Some((&mut *data, width)));
+        let (rho, slope) = self.loss.evaluate(squared(&r), graduation);
+        if slope != 1.0 {
+            let root = slope.sqrt();
+            r.iter_mut().for_each(|x| *x *= root);
+            data[..M * width].iter_mut().for_each(|x| *x *= root);
+        }
+        (r, rho)
+    }
+}
+
 impl<F: Factor<M>, const M: usize> FactorPool for Pool<F, M> {
     fn nodes(&self, place: usize) -> &[u32] {
         self.placed[place].nodes.as_ref()
@@ -70,6 +91,14 @@ impl<F: Factor<M>, const M: usize> FactorPool for Pool<F, M> {
 
     fn loss(&self, place: usize) -> Loss {
         self.placed[place].loss
+    }
+
+    fn linearize(&self, place: usize, graph: &Graph, x: &[&[f64]], columns: &[Columns<'_>]) -> (Vec<f64>, Vec<f64>) {
+        let width = width(columns);
+        let mut data = vec![0.0; M * width];
+        let jacobian = Jacobian { data: &mut data, columns, width };
+        let (r, _) = self.placed[place].linearize(x, jacobian, graph.graduation);
+        (r.to_vec(), data)
     }
 
     fn is_prior(&self) -> bool {
@@ -92,18 +121,9 @@ impl<F: Factor<M>, const M: usize> FactorPool for Pool<F, M> {
                 continue;
             }
             let data = batch.room(run, nodes, &arguments, M);
-            let mut r =
-                placed.factor.evaluate(x, Some(&mut Jacobian { data: &mut *data, columns, width: arguments.width }));
-            let width = arguments.width;
-            compact(data, width, columns);
-            placed.noise.whiten(&mut r, Some((&mut *data, width)));
-            let (rho, slope) = placed.loss.evaluate(squared(&r), run.graduation);
+            let jacobian = Jacobian { data, columns, width: arguments.width };
+            let (r, rho) = placed.linearize(x, jacobian, run.graduation);
             run.cost += 0.5 * rho;
-            if slope != 1.0 {
-                let root = slope.sqrt();
-                r.iter_mut().for_each(|x| *x *= root);
-                data[..M * width].iter_mut().for_each(|x| *x *= root);
-            }
             batch.push(nodes, &arguments, &r);
         }
         batch.flush(run);
@@ -164,6 +184,18 @@ impl<V: Variable<Over<f64> = V>> PriorPool<V> {
             *r *= w;
         }
     }
+
+    fn differentiate(&self, prior: &PlacedPrior, x: &[f64], jacobian: Jacobian<'_>, steps: &mut Vec<Dual>) {
+        let Jacobian { data, columns, width } = jacobian;
+        steps.resize(prior.weights.len(), Dual::from(0.0));
+        forward::<(V,)>(&[x], &mut Jacobian { data: &mut *data, columns, width }, steps, |(y,), steps| {
+            V::local(&prior.mean, &y, steps)
+        });
+        compact(data, width, columns);
+        for (row, w) in prior.weights.iter().enumerate() {
+            data[row * width..(row + 1) * width].iter_mut().for_each(|x| *x *= w);
+        }
+    }
 }
 
 impl<V: Variable<Over<f64> = V>> FactorPool for PriorPool<V> {
@@ -180,6 +212,14 @@ impl<V: Variable<Over<f64> = V>> FactorPool for PriorPool<V> {
 
     fn loss(&self, _place: usize) -> Loss {
         Loss::Squared
+    }
+
+    fn linearize(&self, place: usize, _graph: &Graph, x: &[&[f64]], columns: &[Columns<'_>]) -> (Vec<f64>, Vec<f64>) {
+        let (prior, width) = (&self.placed[place], width(columns));
+        let mut data = vec![0.0; prior.weights.len() * width];
+        let jacobian = Jacobian { data: &mut data, columns, width };
+        self.differentiate(prior, x[0], jacobian, &mut Vec::new());
+        (self.residual(place, x), data)
     }
 
     fn is_prior(&self) -> bool {
@@ -204,18 +244,8 @@ impl<V: Variable<Over<f64> = V>> FactorPool for PriorPool<V> {
             }
             let columns = &arguments.columns[..1];
             let data = batch.room(run, &prior.node, &arguments, rows);
-            steps.resize(rows, Dual::from(0.0));
-            forward::<(V,)>(
-                &arguments.x[..1],
-                &mut Jacobian { data: &mut *data, columns, width: arguments.width },
-                &mut steps,
-                |(y,), steps| V::local(&prior.mean, &y, steps),
-            );
-            let width = arguments.width;
-            compact(data, width, columns);
-            for (row, w) in prior.weights.iter().enumerate() {
-                data[row * width..(row + 1) * width].iter_mut().for_each(|x| *x *= w);
-            }
+            let jacobian = Jacobian { data, columns, width: arguments.width };
+            self.differentiate(prior, arguments.x[0], jacobian, &mut steps);
             batch.push(&prior.node, &arguments, r);
         }
         batch.flush(run);

@@ -86,7 +86,8 @@ fn prior_of(honest: &Honest<'_>, built: &Built, part: &Component) -> f64 {
     feature.map_or(f64::INFINITY, |feature| priors.features[feature][k])
 }
 
-fn stepped(pose: &Pose, parts: &[(usize, f64)]) -> Pose {
+/// A pose moved by some coordinates of a step.
+pub(crate) fn stepped(pose: &Pose, parts: &[(usize, f64)]) -> Pose {
     let mut stored = vec![0.0; pose.ambient()];
     Pose::store(pose, &mut stored);
     Pose::retract::<f64>(&stored, |k| parts.iter().filter(|(at, _)| *at == k).map(|(_, step)| step).sum())

@@ -91,7 +91,7 @@ pub struct Options {
     /// Whether the noise of pixels, points, joints, poses and actions is estimated from the data (variance components). What the
     /// rig states is where that starts; where it says that something recorded is exact, a guess is.
     pub estimate_noise: bool,
-    /// Whether the influence of every sample is computed: takes one linearisation per sample.
+    /// Whether the influence of every sample is computed: takes less than the calibration itself.
     pub influence: bool,
 }
 

@@ -57,7 +57,7 @@ pub struct Calibrate {
     /// Estimate the noise of pixels, points, joints, poses and actions from the data; [noise] of the rig is where that starts
     #[arg(long)]
     estimate_noise: bool,
-    /// Also report how far leaving out each sample would move the tip, and which samples fit worst; takes minutes where there are thousands
+    /// Also report how far leaving out each sample would move the tip, and which samples fit worst
     #[arg(long)]
     influence: bool,
     /// Pick the noise of joints or poses, relative to that of pixels, by how well samples held out are predicted

@@ -74,3 +74,17 @@ fn a_slightly_wrong_sample_is_on_top_of_both_lists() {
     assert!(most_influential(&all, 3).iter().any(|one| one.sample == 11), "{:?}", most_influential(&all, 10));
     assert_eq!(most_influential(&all, 10).len(), 10);
 }
+
+#[test]
+fn any_number_of_threads_finds_the_same_to_the_last_bit() {
+    let mut truth = random_rig(6, 2, 12, 8);
+    truth.noise.joints = 0.002;
+    let recording = record(&truth, 60, 8);
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| influence(&start(&truth), &recording))
+    };
+    let one = with(1);
+    assert!(one.iter().all(|one| one.tip.unwrap() > 0.0));
+    assert!(one == with(2) && one == with(5));
+}
