@@ -1,5 +1,5 @@
 //! `handeye calibrate`: a recording to a learned rig.
-use super::answer::Answer;
+use super::answer::{Answer, remark};
 use super::counts::learned_in_words;
 use super::folds::Folds;
 use super::inputs::{check_output, eye_in_hand, files_read, is_same, read_and_remark, read_rig, write_output};
@@ -7,6 +7,7 @@ use super::noise;
 use super::progress::Bar;
 use super::reading::Reading;
 use super::trust;
+use super::unsaid;
 use super::words::{cameras_json, count, duration, error_table, file_name, file_names, points_json};
 use clap::Args;
 use handeye::Error;
@@ -111,7 +112,12 @@ const MISFIT: f64 = 10.0;
 impl Calibrate {
     pub fn run(&self, is_json: bool, typed: &str) -> Result<Answer, Error> {
         let input = self.rig.as_deref().map(read_rig).transpose()?;
-        let (recording, notes) = read_and_remark(&self.recordings, input.as_ref(), &self.reading, &self.relearn)?;
+        let (recording, mut notes) = read_and_remark(&self.recordings, input.as_ref(), &self.reading, &self.relearn)?;
+        let is_any_robot = input.as_ref().is_none_or(|input| input.rig.robot.joints.is_empty());
+        if let Some(note) = is_any_robot.then(|| unsaid::still_joints(&recording)).flatten() {
+            remark(&note);
+            notes.push(note);
+        }
         let mut inputs = files_read(&self.recordings, self.rig.as_deref(), &self.reading);
         check_output(&self.output, &inputs)?;
         if let Some(page) = &self.report {
@@ -178,15 +184,18 @@ impl Calibrate {
                 "{output} was not written: {reason}; more varied motions, or a rig that gives more, would do"
             ));
         }
-        let spoils = report.rms_px > MISFIT * rig.noise.pixels;
-        if !places_cameras && report.targets.is_none() && (!report.converged || spoils) {
-            let hint = "cameras that no rig lists are taken to stand in the world: where they are on the hand, say --eye-in-hand (handeye check \
+        if report.targets.is_none() && (!report.converged || report.rms_px > MISFIT * rig.noise.pixels) {
+            let side = "cameras that no rig lists are taken to stand in the world: where they are on the hand, say --eye-in-hand (handeye check \
                         RIG REC tries that and other mistakes)";
-            match &mut answer.failure {
-                Some(failure) => *failure += &format!("; {hint}"),
-                None => answer.text += &format!("\n{hint}\n"),
+            let names = is_any_robot.then(|| unsaid::known_names(&recording)).flatten();
+            let hints: Vec<String> = (!places_cameras).then(|| side.to_owned()).into_iter().chain(names).collect();
+            for hint in &hints {
+                match &mut answer.failure {
+                    Some(failure) => *failure += &format!("; {hint}"),
+                    None => answer.text += &format!("\n{hint}\n"),
+                }
             }
-            answer.json["hint"] = json!(hint);
+            answer.json["hints"] = json!(hints);
         }
         if let Some(path) = &self.report {
             let title = format!("{}, learned from {}", file_name(&self.output), file_names(&self.recordings));

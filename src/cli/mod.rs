@@ -26,6 +26,7 @@ mod survey;
 mod table;
 mod task;
 mod trust;
+mod unsaid;
 mod words;
 mod written;
 

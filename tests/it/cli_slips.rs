@@ -189,3 +189,28 @@ fn no_file_that_is_read_is_written_over() {
     }
     assert_eq!([folder.read("left.yaml"), folder.read("right.yaml")], [lens, lens]);
 }
+
+/// A bag of an arm with a gripper, learned without a word of what robot it is.
+#[test]
+fn joints_that_never_move_and_the_names_of_a_shipped_arm_are_remarked_on() {
+    let folder = Folder::new("slips-gripper");
+    folder.expect(0, "simulate ur5 --samples 40 --seed 1 -o rec.jsonl");
+    let path = folder.path().join("rec.jsonl");
+    let mut recording = Recording::read(&path).unwrap();
+    let plain = recording.joints.clone();
+    recording.joints = plain.iter().map(|joint| format!("left_{joint}_joint")).chain(["finger".to_owned()]).collect();
+    recording.samples.iter_mut().flat_map(|sample| &mut sample.joints).for_each(|joints| joints.push(0.04));
+    recording.write(&path).unwrap();
+    let output = folder.run("calibrate rec.jsonl -o x.toml");
+    let err = String::from_utf8(output.stderr).unwrap();
+    let arm = plain.iter().map(|joint| format!("left_{joint}_joint")).collect::<Vec<_>>().join(",");
+    assert!(
+        err.contains(&format!(
+            "never move: finger; where they are not the arm's, as a gripper's are not, --joints {arm} leaves"
+        )),
+        "{err}"
+    );
+    assert!(err.contains("called as those of shipped rigs (ur5_arm, ur5e, ur3e, ur10, ur10e)"), "{err}");
+    let (_, err) = folder.expect(0, &format!("calibrate rec.jsonl --joints {arm} --rig ur5_arm -o x.toml"));
+    assert!(!err.contains("never move"), "{err}");
+}
