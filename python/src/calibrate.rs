@@ -5,7 +5,7 @@ use crate::recording::Recording;
 use crate::rig::{AnyRig, Rig};
 use crate::work;
 use handeye::calibrate::{
-    self as library, DeterminedBy, NoiseTrial, Options, Report, TargetReport as Targets, camera_deviations,
+    self as library, DeterminedBy, NoiseTrial, Options, Report, TargetReport as Targets, camera_poses_in_words,
     length_in_words,
 };
 use handeye::report::{About, Subject, html, suggestion};
@@ -303,7 +303,7 @@ impl Calibration {
         if let Some(tip) = &report.tip {
             lines.push(format!("the tip's position is known to {tip}"));
         }
-        lines.extend(camera_deviations(&self.inner));
+        lines.extend(camera_poses_in_words(&self.inner));
         for (title, list) in [
             ("left open by the data", &report.gauge),
             ("the robot's state", &report.states),

@@ -162,7 +162,7 @@ impl Evaluation {
     /// What does not fit, in words.
     #[getter]
     fn findings(&self) -> Vec<String> {
-        self.inner.fitting.findings.iter().map(Finding::of_evaluation).collect()
+        self.inner.misfits.iter().chain(&self.inner.fitting.findings).map(Finding::of_evaluation).collect()
     }
 
     /// What a reader may do, in sentences; judged without what does not fit.

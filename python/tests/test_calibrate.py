@@ -199,7 +199,7 @@ def test_the_report_is_one_page_about_this_calibration(learned, tmp_path):
     for camera in learned.rig.camera_names:
         shift = np.linalg.norm(learned.deviations[f"cameras.{camera}.pose"][:3])
         length = f"{shift:.2e}".replace("e-0", "e-")
-        assert f"the pose of camera `{camera}` is known to {length} and " in text
+        assert f"camera `{camera}`: " in text and f"± {length}; turned by " in text
 
 
 def test_an_evaluation_has_a_page_too(learned, fresh, tmp_path):

@@ -34,6 +34,14 @@ impl Direction {
         Some(samples.iter().map(|&s| (tip(&ahead, s) - tip(&behind, s)).norm() * per_step(sd)).collect())
     }
 
+    /// How far the centre of each camera moves against what it is mounted on in one standard deviation; `None` where nothing bounds it.
+    pub fn camera_motion(&self, state: &State, built: &Built) -> Option<Vec<f64>> {
+        let sd = self.sd?;
+        let [ahead, behind] = self.both_ways(state, built).map(|model| model.cameras);
+        let centres = ahead.iter().zip(&behind).map(|(a, b)| (a.pose.translation - b.pose.translation).norm());
+        Some(centres.map(|step| step * per_step(sd)).collect())
+    }
+
     /// The model a step ahead, and a step behind.
     pub fn both_ways(&self, state: &State, built: &Built) -> [Model; 2] {
         [STEP, -STEP].map(|by| self.moved(state, built, by))

@@ -1,7 +1,8 @@
 //! Predicts the detections of a recording and compares.
+use super::misfit::misfits;
 use super::observation::Kind;
 use super::placed::Placed;
-use super::{Fitting, ReadingNoise};
+use super::{Finding, Fitting, ReadingNoise};
 use crate::Error;
 use crate::recording::{Recording, Sample};
 use crate::rig::{Camera, Fit, Model, ModelCamera, Rig};
@@ -86,6 +87,9 @@ pub struct Evaluation {
     pub fitting: Fitting,
     /// What noise of the readings alone gives such errors, over all cameras and per camera of the rig.
     pub reading_noise: (ReadingNoise, Vec<ReadingNoise>),
+    /// [`Finding::Misfit`] where the errors, without what does not fit, are far larger than the stated noise and that of readings, as a calibration
+    /// has it.
+    pub misfits: Vec<Finding>,
 }
 
 /// Distances of single detections from where they are predicted.
@@ -145,6 +149,7 @@ pub fn evaluate(rig: &Rig, recording: &Recording) -> Result<Evaluation, Error> {
     let model = Model::new(rig)?;
     evaluation.fitting = Fitting::new(rig, &model, recording, &samples);
     evaluation.reading_noise = ReadingNoise::new(rig, &model, recording);
+    evaluation.misfits = misfits(&rig.noise, &evaluation.fitting.total, &evaluation.reading_noise.0);
     Ok(evaluation)
 }
 

@@ -4,22 +4,20 @@ use super::evaluate::{Distances, Errors, PixelDistance};
 use super::gauge;
 use super::graph::{State, row};
 use super::lengths;
+use super::misfit::misfits;
 use super::observation::Kind;
 use super::outliers::Verdict;
 use super::priors::prior_sds;
 use super::residuals::distances;
 use super::setup::Setup;
 use super::weak;
-use super::{Calibration, CameraErrors, Finding, Report, StageReport};
+use super::{Calibration, CameraErrors, Finding, ReadingNoise, Report, StageReport};
 use crate::camera::CameraModel;
 use crate::rig::{Fit, JointField, Parameter, Rig};
 use handeye_solvers::Pose;
 
 /// Values are told of where they are so many standard deviations from what was given.
 const FAR: f64 = 5.0;
-
-/// Errors are told of where they are this many times the stated noise.
-const MISFIT: f64 = 3.0;
 
 /// Puts everything together.
 pub(crate) fn finish(
@@ -82,11 +80,7 @@ pub(crate) fn finish(
     });
     let far = far_from_given(&setup.rig, &rig);
     let unseen = setup.unseen.iter().map(|camera| Finding::UnseenCamera { camera: camera.clone() });
-    let misfits = Kind::ALL.into_iter().filter_map(|kind| {
-        let rms = if kind == Kind::Pixels { total.rms_px } else { total.points.rms_m };
-        let ratio = rms / (kind.coordinates().sqrt() * setup.sd(kind));
-        (ratio > MISFIT).then(|| Finding::Misfit { ratio, stated: kind.distance(setup.sd(kind)) })
-    });
+    let misfits = misfits(&setup.rig.noise, &total, &ReadingNoise::default());
     let report = Report {
         samples,
         observations: total.observations,
@@ -103,6 +97,7 @@ pub(crate) fn finish(
         noise: None,
         states: setup.states.words(&setup.rig.noise),
         findings: misfits
+            .into_iter()
             .chain(lengths::missed(setup, state))
             .chain(far)
             .chain(unseen)

@@ -170,7 +170,7 @@ pub(crate) fn is_tip_learned(setup: &Setup, freedom: &Freedom) -> bool {
 }
 
 /// Numbers of the first row that the base's place makes redundant, and of the last that the tip's frame does.
-fn ends(convention: Convention) -> (&'static [usize], &'static [usize]) {
+pub(crate) fn ends(convention: Convention) -> (&'static [usize], &'static [usize]) {
     match convention {
         Convention::Dh => (&[0, 1], &[0, 1, 2, 3]),
         Convention::ModifiedDh => (&[0, 1, 2, 3], &[0, 1]),

@@ -1,10 +1,12 @@
 //! Learns a rig from a recording.
 mod anchor;
+mod camera_pose;
 mod cameras;
 mod cures;
 mod deviations;
 mod direction;
 mod evaluate;
+mod findings;
 mod finish;
 mod fitting;
 mod gauge;
@@ -17,11 +19,13 @@ mod known;
 mod lengths;
 mod leverage;
 mod look;
+mod misfit;
 mod motion;
 mod moves;
 mod numbers;
 mod observation;
 mod outliers;
+mod overstated;
 mod placed;
 mod poorly;
 mod priors;
@@ -45,24 +49,26 @@ mod variances;
 mod visual;
 mod weak;
 
+pub use camera_pose::{CameraPose, camera_poses, camera_poses_in_words};
 pub(crate) use cameras::with_headers;
 pub use evaluate::{
     CameraErrors, Distances, Errors, Evaluation, PixelDistance, PointErrors, SampleDistances, SpaceErrors, distances,
     evaluate,
 };
 pub(crate) use evaluate::{Correspondence, median};
+pub use findings::findings_in_words;
 pub use fitting::Fitting;
 pub use influence::{Influence, most_influential, worst_fitting};
+pub(crate) use misfit::over_noise;
 pub(crate) use observation::Kind;
 pub(crate) use outliers::{is_wrong, yardstick};
+pub use overstated::{OverstatedNoise, overstated_noise};
 pub(crate) use placed::Placed;
 pub use priors::assumptions;
 pub(crate) use priors::prior_sds;
 pub use reading_noise::ReadingNoise;
 pub use relearn::relearn;
-pub use report::{
-    Calibration, Distance, Finding, Report, StageReport, TipDeviation, camera_deviations, length_in_words,
-};
+pub use report::{Calibration, Distance, Finding, Report, StageReport, TipDeviation, length_in_words};
 pub use selection::{NoiseTrial, select_noise};
 pub use suggest::{SuggestOptions, SuggestedSample, Suggestion, suggest};
 pub use targets::{Disagreement, TargetReport};

@@ -1,6 +1,6 @@
 //! What a calibration did and found, and how good it is.
 use super::{CameraErrors, Combination, Influence, PointErrors, TargetReport};
-use crate::rig::{Camera, Length, Noise, Rig};
+use crate::rig::{Length, Noise, Rig};
 
 /// A learned rig and how it came about.
 #[derive(Clone, Debug)]
@@ -49,7 +49,8 @@ pub struct Report {
     /// Standard deviations of the pose of every camera of the learned rig against the arm: length [m, or the model's unit] and angle [rad]. Where
     /// the base's frame lies against the first axis, which nothing that is seen depends on, is no part of them. Empty where the tip has none.
     pub camera_poses: Vec<[f64; 2]>,
-    /// Combinations of numbers that nothing, or a prior more than the data, determines; the weakest first.
+    /// Combinations of numbers that nothing, or a prior more than the data, determines; those that move a camera against what it is mounted on
+    /// first, then those that move the tip, then the others.
     pub weak: Vec<Combination>,
     /// What leaving out each sample would change, where [`Options::influence`](super::Options) asks for it.
     pub influence: Vec<Influence>,
@@ -149,8 +150,8 @@ impl Finding {
         match self {
             Finding::UnseenCamera { camera } => format!("camera `{camera}` saw nothing"),
             Finding::Misfit { ratio, stated } => format!(
-                "errors are {ratio:.1} times the stated noise of {}: the noise is larger, a lens model or a joint's kind is wrong, or the fit \
-                 went astray",
+                "errors are {ratio:.1} times the stated noise of {}: the noise is larger, a number that is held, a lens model or a joint's kind is \
+                 wrong, or the fit went astray",
                 stated.rounded()
             ),
             Finding::MissedLength { length, learned } => format!(
@@ -302,34 +303,4 @@ impl std::fmt::Display for TipDeviation {
 /// A length with its unit, or as a bare number where nothing metric is known.
 pub fn length_in_words(length: f64, metric: bool) -> String {
     if metric { format!("{:.3} mm", 1e3 * length) } else { format!("{length:.2e}") }
-}
-
-/// Of two standard deviations, the smaller is told too where it is below this share of the other.
-const ALIKE: f64 = 0.9;
-
-/// How well the pose of every camera is known, with what priors say of it, in words; nothing of those whose poses are held or left open.
-pub fn camera_deviations(calibration: &Calibration) -> Vec<String> {
-    let Calibration { rig: learned, report } = calibration;
-    let unit = if report.metric { "" } else { ", in the model's unit" };
-    let of_camera = |(index, camera): (usize, &Camera)| {
-        let sd = learned.fit.as_ref()?.sd.get(&format!("cameras.{}.pose", camera.name))?;
-        let [x, y, z, turns @ ..] = sd.as_slice() else { return None };
-        let turn = turns.iter().map(|sd| sd * sd).sum::<f64>().sqrt();
-        let shift = (x * x + y * y + z * z).sqrt();
-        let words =
-            |shift: f64, turn: f64| format!("{} and {:.3}°", length_in_words(shift, report.metric), turn.to_degrees());
-        let (name, whole) = (&camera.name, words(shift, turn));
-        let against_arm = report.camera_poses.get(index).filter(|[less, _]| *less > 0.0 && *less < ALIKE * shift);
-        Some(match against_arm {
-            Some([shift, turn]) => format!(
-                "the pose of camera `{name}` against the arm is known to {} (standard deviation, with the priors{unit}); to {whole} where the base's \
-                 frame, of which nothing is seen, counts as no better known than assumed",
-                words(*shift, *turn)
-            ),
-            None => {
-                format!("the pose of camera `{name}` is known to {whole} (standard deviation, with the priors{unit})")
-            }
-        })
-    };
-    learned.cameras.iter().enumerate().filter_map(of_camera).collect()
 }

@@ -12,8 +12,9 @@ use super::words::{cameras_json, count, duration, error_table, file_name, file_n
 use clap::Args;
 use handeye::Error;
 use handeye::calibrate::{
-    Calibration, Distance, Errors, Finding, NoiseTrial, Options, Progress, Report, TargetReport, assumptions,
-    calibrate, camera_deviations, relearn, select_noise,
+    Calibration, CameraPose, Distance, Errors, Finding, NoiseTrial, Options, OverstatedNoise, Progress, Report,
+    TargetReport, assumptions, calibrate, camera_poses, camera_poses_in_words, findings_in_words, overstated_noise,
+    relearn, select_noise,
 };
 use handeye::recording::Recording;
 use handeye::report;
@@ -162,6 +163,8 @@ impl Calibrate {
         let mut answer =
             Answer::new(describe(&rig, &recording, &calibration, seconds), report_json(report, &recording));
         answer.json["seconds"] = json!(seconds);
+        answer.json["camera_poses"] = camera_poses(&calibration).iter().map(camera_pose_json).collect();
+        answer.json["noise_overstated"] = overstated_noise(&calibration).iter().map(overstated_json).collect();
         answer.json["notes"] = json!(notes);
         if !trials.is_empty() {
             answer.text += &format!("\n{}", noise::trials_table(&trials));
@@ -234,6 +237,13 @@ fn describe(before: &Rig, recording: &Recording, calibration: &Calibration, seco
         Some(targets) => text += &targets_in_words(targets, report.rejected),
         None => text += &error_table(&report.cameras, &together(report), report.rejected).to_string(),
     }
+    for overstated in overstated_noise(calibration) {
+        text += &format!("\n{overstated}\n");
+    }
+    let cameras = camera_poses_in_words(calibration);
+    if !cameras.is_empty() {
+        text += &format!("\n{}\n", cameras.join("\n"));
+    }
     if let Some(noise) = &report.noise {
         text += &format!("\nthe noise, estimated from the data: {}\n", noise::in_words(noise, recorded(report)));
     }
@@ -244,14 +254,10 @@ fn describe(before: &Rig, recording: &Recording, calibration: &Calibration, seco
             text += &format!("  what was assumed: {}\n", assumed.join(", "));
         }
     }
-    let cameras = camera_deviations(calibration);
-    if !cameras.is_empty() {
-        text += &format!("\n{}\n", cameras.join("\n"));
-    }
     for (title, lines) in [
         ("what is known of the robot's state", report.states.clone()),
         ("what the data leave open, and how it was fixed", report.gauge.clone()),
-        ("what does not fit", report.findings.iter().map(Finding::to_string).collect()),
+        ("what does not fit", findings_in_words(&report.findings, true)),
     ] {
         if !lines.is_empty() {
             text += &format!("\n{title}:\n");
@@ -259,6 +265,25 @@ fn describe(before: &Rig, recording: &Recording, calibration: &Calibration, seco
         }
     }
     text + &trust::text(report, recording)
+}
+
+fn camera_pose_json(pose: &CameraPose) -> Value {
+    json!({
+        "camera": pose.camera,
+        "on": pose.on,
+        "xyz": pose.xyz,
+        "rotation_vector": pose.turn,
+        "sd": pose.sd,
+        "assumed": pose.assumed,
+        "sd_with_assumed": pose.sd_with_assumed,
+        "metric": pose.metric,
+        "text": pose.to_string(),
+    })
+}
+
+fn overstated_json(noise: &OverstatedNoise) -> Value {
+    let json = json!({ "factor": noise.factor, "text": noise.to_string() });
+    with(with(json, "stated", &noise.stated), "shown", &noise.shown)
 }
 
 fn targets_in_words(targets: &TargetReport, rejected: usize) -> String {

@@ -83,7 +83,7 @@ impl Demo {
             "floor": { "rms_px": floor.rms_px, "mean_px": floor.mean_px, "median_px": floor.median_px },
             "seconds": seconds,
             "calibration": report_json(&learned.report, &recording),
-            "evaluation": evaluate::json(&judged),
+            "evaluation": evaluate::json(&learned.rig, &judged),
             "rms_over_floor": ratio,
         });
         let mut answer = Answer::new(text, json);

@@ -6,7 +6,7 @@ use super::reading::Reading;
 use super::words::{cameras_json, count, error_table, errors_json, file_name, file_names, list, mm, px, seconds};
 use clap::Args;
 use handeye::Error;
-use handeye::calibrate::{Distance, Evaluation, ReadingNoise, SpaceErrors, evaluate};
+use handeye::calibrate::{Distance, Evaluation, ReadingNoise, SpaceErrors, evaluate, findings_in_words};
 use handeye::recording::Recording;
 use handeye::report::{About, evaluation_html, evaluation_steps};
 use handeye::rig::Rig;
@@ -50,14 +50,14 @@ impl Evaluate {
             let page = evaluation_html(&about, &input.rig, &recording, &evaluation)?;
             write_output(path, &page)?;
         }
-        let mut answer = Answer::new(text(&input.rig, &recording, &evaluation), json(&evaluation));
+        let mut answer = Answer::new(text(&input.rig, &recording, &evaluation), json(&input.rig, &evaluation));
         answer.json["notes"] = json!(notes);
         Ok(answer)
     }
 }
 
 /// What an evaluation found, as the one object of `--json`.
-pub fn json(evaluation: &Evaluation) -> Value {
+pub fn json(rig: &Rig, evaluation: &Evaluation) -> Value {
     let mut object = errors_json(&evaluation.total);
     object.insert("samples".to_owned(), json!(evaluation.samples));
     object.insert("rejected".to_owned(), json!(evaluation.rejected));
@@ -77,8 +77,9 @@ pub fn json(evaluation: &Evaluation) -> Value {
     fitting.insert("in_space".to_owned(), space_json(evaluation.fitting.space));
     fitting.insert("cameras".to_owned(), cameras_json(&evaluation.fitting.cameras));
     object.insert("without_what_does_not_fit".to_owned(), Value::Object(fitting));
-    let findings = evaluation.fitting.findings.iter();
+    let findings = evaluation.misfits.iter().chain(&evaluation.fitting.findings);
     object.insert("findings".to_owned(), findings.map(|one| finding_json(one, one.of_evaluation())).collect());
+    object.insert("next".to_owned(), json!(evaluation_steps(rig, evaluation)));
     Value::Object(object)
 }
 
@@ -125,7 +126,7 @@ fn text(rig: &Rig, recording: &Recording, evaluation: &Evaluation) -> String {
             text += &format!("\nin space that is {}\n", space_in_words(space));
         }
         text += "\nwhat does not fit:\n";
-        fitting.findings.iter().for_each(|finding| text += &format!("  {}\n", finding.of_evaluation()));
+        findings_in_words(&fitting.findings, false).iter().for_each(|line| text += &format!("  {line}\n"));
     }
     if !fitting.poor.is_empty() {
         let one = |(sample, off): &(usize, Distance)| match recording.samples[*sample].time {

@@ -1,7 +1,7 @@
 //! Cross-validation: every sample is predicted by a rig that was learned without it.
 use super::progress::Bar;
 use super::table::Table;
-use super::words::{ErrorColumns, count, errors_json};
+use super::words::{ErrorColumns, count, errors_json, mm, px};
 use handeye::Error;
 use handeye::calibrate::{Distances, Errors, Options, calibrate, distances};
 use handeye::recording::Recording;
@@ -48,7 +48,17 @@ impl Folds {
     /// For a report.
     pub fn as_table(&self) -> ExtraTable {
         let header = self.header().into_iter().map(str::to_owned).collect();
-        ExtraTable { title: TITLE.to_owned(), header, rows: self.rows() }
+        ExtraTable { title: TITLE.to_owned(), header, rows: self.rows(), in_short: self.in_short() }
+    }
+
+    fn in_short(&self) -> String {
+        let Errors { rms_px, median_px, points, observations, .. } = &self.together;
+        let of_pixels = || format!("{} px rms ({} px in the median)", px(*rms_px), px(*median_px));
+        let of_points = || format!("{} mm rms ({} mm in the median)", mm(points.rms_m), mm(points.median_m));
+        let pixels = (*observations > points.observations).then(of_pixels);
+        let figures: Vec<String> = pixels.into_iter().chain((points.observations > 0).then(of_points)).collect();
+        let (folds, figures) = (self.folds.len(), figures.join(" and "));
+        format!("Samples that it was not learned from, by {folds} folds, it predicts to {figures}.")
     }
 
     fn header(&self) -> Vec<&'static str> {

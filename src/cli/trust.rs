@@ -58,6 +58,7 @@ pub fn weak_json(weak: &Combination) -> Value {
         "sd_data_over_prior": sd_ratio,
         "sd": sd,
         "tip_sd": weak.tip,
+        "camera": weak.camera.as_ref().map(|(name, by)| json!({ "name": name, "sd": by })),
         "cure": weak.cure,
         "text": weak.to_string(),
     })

@@ -4,8 +4,9 @@ use super::sections::{WORST, sample_cells, sample_header};
 use super::{arm, noise, residuals, sections, values, verdict};
 use crate::Error;
 use crate::calibrate::{
-    Calibration, Combination, DeterminedBy, Finding, Influence, SuggestOptions, SuggestedSample, Suggestion,
-    TargetReport, camera_deviations, combinations_in_words, length_in_words, most_influential, suggest,
+    Calibration, Combination, DeterminedBy, Influence, SuggestOptions, SuggestedSample, Suggestion, TargetReport,
+    camera_poses_in_words, combinations_in_words, findings_in_words, length_in_words, most_influential,
+    overstated_noise, suggest,
 };
 use crate::recording::Recording;
 use crate::rig::Rig;
@@ -34,10 +35,15 @@ pub struct ExtraTable {
     pub header: Vec<String>,
     /// Its cells, row by row.
     pub rows: Vec<Vec<String>>,
+    /// A sentence for the first section, on what it says in all; empty where there is none.
+    pub in_short: String,
 }
 
 /// Positions to move to next that a page suggests.
 const SUGGESTED: usize = 3;
+
+/// Numbers that move less than this share of the largest are only counted.
+const LEAST_SHARE: f64 = 0.01;
 
 /// Numbers of a combination that a page has at most: those of a thousand features would be megabytes.
 const NUMBERS: usize = 200;
@@ -61,7 +67,7 @@ pub fn html(subject: &Subject<'_>) -> Result<String, Error> {
     summary(&mut page, subject);
     sections::how_it_was_read(&mut page, &subject.about, subject.recording);
     sections::cameras(&mut page, rig, &report.cameras, &residuals);
-    noise::section(&mut page, rig, &residuals, &report.findings);
+    noise::section(&mut page, rig, &residuals, &report.findings, &overstated_noise(subject.calibration));
     sections::worst(&mut page, rig, subject.recording, &residuals, &report.findings);
     sections::coverage(&mut page, rig, subject.recording);
     arm::view(&mut page, rig, subject.recording, arm::Shown::Few)?;
@@ -110,12 +116,12 @@ fn summary(page: &mut Page, subject: &Subject<'_>) {
     }
     page.list(&report.states);
     page.list(&report.targets.as_ref().map_or_else(Vec::new, TargetReport::remarks));
-    page.list(&camera_deviations(subject.calibration));
+    page.list(&camera_poses_in_words(subject.calibration));
     if report.findings.is_empty() {
         page.paragraph("Nothing in the recording stands out as wrong.");
     } else {
         page.paragraph("What does not fit; none of the figures above count what was left out:");
-        page.list(&report.findings.iter().map(Finding::to_string).collect::<Vec<_>>());
+        page.list(&findings_in_words(&report.findings, true));
     }
 }
 
@@ -134,13 +140,14 @@ fn open(page: &mut Page, subject: &Subject<'_>) {
         return;
     }
     page.paragraph(
-        "What can move together without the recording objecting much; lengths at the tip are standard deviations.",
+        "What can move together without the recording objecting much. How far it moves a camera against what that is mounted on, and the tip against \
+         the base, is one standard deviation; what moves neither does not matter for the use of either.",
     );
-    page.folded_list(&report.weak.iter().map(|weak| combination(weak, report.metric)).collect::<Vec<_>>());
+    page.folded_list(&report.weak.iter().map(combination).collect::<Vec<_>>());
 }
 
 /// What moves and what that means, with all its numbers to unfold.
-fn combination(weak: &Combination, metric: bool) -> Folded {
+fn combination(weak: &Combination) -> Folded {
     let by = match weak.determined_by {
         DeterminedBy::Nothing => "nothing determines this".to_owned(),
         DeterminedBy::Prior(ratio) if ratio.is_finite() => {
@@ -149,19 +156,20 @@ fn combination(weak: &Combination, metric: bool) -> Folded {
         DeterminedBy::Prior(_) => "its prior alone determines this".to_owned(),
         DeterminedBy::Poorly { .. } => "the data determine this, and poorly".to_owned(),
     };
-    let tip = match (weak.tip, weak.determined_by) {
-        (Some(tip), _) => format!(", {} at the tip", length_in_words(tip, metric)),
-        (None, DeterminedBy::Nothing) => ", without bound".to_owned(),
-        (None, _) => String::new(),
+    let matters = match weak.determined_by {
+        DeterminedBy::Nothing => ", without bound".to_owned(),
+        _ => format!("; {}", weak.matters()),
     };
     let cure = if weak.cure.is_empty() { String::new() } else { format!(" What would help: {}.", weak.cure) };
     let moves = weak.moves.strip_prefix("the ").map_or_else(|| weak.moves.clone(), |rest| format!("The {rest}"));
-    let numbers = weak.numbers.iter().take(NUMBERS).map(|(path, by)| format!("{by:+.3} {path}"));
-    let more = weak.numbers.len().checked_sub(NUMBERS + 1).map(|more| format!("and {} more", more + 1));
+    let counts = weak.numbers.iter().filter(|(_, by)| by.abs() >= LEAST_SHARE);
+    let numbers: Vec<String> = counts.take(NUMBERS).map(|(path, by)| format!("{by:+.3} {path}")).collect();
+    let rest = weak.numbers.len() - numbers.len();
+    let more = (rest > 0).then(|| format!("and {rest} that move less"));
     Folded {
-        words: format!("{moves}: {by}{tip}.{cure}"),
+        words: format!("{moves}: {by}{matters}.{cure}"),
         summary: format!("its {} numbers, and how far each moves", weak.numbers.len()),
-        more: numbers.chain(more).collect::<Vec<_>>().join(", "),
+        more: numbers.into_iter().chain(more).collect::<Vec<_>>().join(", "),
     }
 }
 
@@ -224,7 +232,7 @@ fn suggested(page: &mut Page, subject: &Subject<'_>) {
 
 /// Tables that were given along.
 fn extra(page: &mut Page, subject: &Subject<'_>) {
-    for (index, ExtraTable { title, header, rows }) in subject.tables.iter().enumerate() {
+    for (index, ExtraTable { title, header, rows, .. }) in subject.tables.iter().enumerate() {
         page.section(&format!("table-{index}"), title);
         let header: Vec<&str> = header.iter().map(String::as_str).collect();
         page.table(&header, rows.iter().map(Vec::as_slice));

@@ -3,7 +3,7 @@ use super::page::{About, Page};
 use super::residuals::of_predictions;
 use super::{arm, change, noise, sections};
 use crate::Error;
-use crate::calibrate::{CameraErrors, Evaluation, Finding, ReadingNoise, SpaceErrors};
+use crate::calibrate::{CameraErrors, Evaluation, Finding, ReadingNoise, SpaceErrors, findings_in_words, over_noise};
 use crate::recording::Recording;
 use crate::rig::Rig;
 
@@ -13,6 +13,9 @@ const WORSE: f64 = 1.5;
 /// A camera is off only where all together are further off than this many times what they were: each has its own usual error, of which a rig
 /// file does not tell.
 const TOGETHER: f64 = 1.1;
+
+/// Errors beyond this many times the stated noise are told of, though they are no misfit yet.
+const TOLD: f64 = 1.5;
 
 /// Said where a rig is judged on what it was learned from.
 const OWN: &str = "The rig was learned from this recording: the figures say how well it was fitted, and not how well it predicts. Judge it on samples that it \
@@ -32,7 +35,7 @@ pub fn evaluation_html(
     summary(&mut page, rig, evaluation);
     sections::how_it_was_read(&mut page, about, recording);
     sections::cameras(&mut page, rig, &evaluation.cameras, &residuals);
-    noise::section(&mut page, rig, &residuals, &evaluation.fitting.findings);
+    noise::section(&mut page, rig, &residuals, &evaluation.fitting.findings, &[]);
     sections::worst(&mut page, rig, recording, &residuals, &evaluation.fitting.findings);
     sections::coverage(&mut page, rig, recording);
     arm::view(&mut page, rig, recording, arm::Shown::Few)?;
@@ -92,9 +95,10 @@ fn summary(page: &mut Page, rig: &Rig, evaluation: &Evaluation) {
     if *rejected > 0 {
         page.paragraph("Left out is what the rig does not know the feature or camera of, and what does not follow from joints or a tip pose.");
     }
+    page.list(&findings_in_words(&evaluation.misfits, false));
     if !fitting.findings.is_empty() {
         page.paragraph("What does not fit:");
-        page.list(&fitting.findings.iter().map(Finding::of_evaluation).collect::<Vec<_>>());
+        page.list(&findings_in_words(&fitting.findings, false));
     }
     if total.behind > 0 {
         page.paragraph(&format!("{} detections are predicted behind their camera.", total.behind));
@@ -149,7 +153,7 @@ pub fn evaluation_steps(rig: &Rig, evaluation: &Evaluation) -> Vec<String> {
                 camera.name
             )
         };
-        steps.extend(off.into_iter().map(words));
+        steps.extend(off.iter().copied().map(words));
     }
     let mistakes = |finding: &Finding| {
         let is_explained = changed.is_some() && change::sample_of(finding).is_some();
@@ -157,18 +161,29 @@ pub fn evaluation_steps(rig: &Rig, evaluation: &Evaluation) -> Vec<String> {
             && !is_explained
     };
     let has_mistakes = fitting.findings.iter().any(mistakes);
+    // Where something moved, that is the reason.
+    let misfits = if off.is_empty() && changed.is_none() { &evaluation.misfits[..] } else { &[] };
     if steps.is_empty() {
         let besides = if has_mistakes { "Without what does not fit, it" } else { "It" };
         steps.push(if usual_px.or(usual_m).is_some() {
-            let noise = if of_all.px > 0.0 || of_all.m > 0.0 { " but for the noise of what was read of the robot" } else { "" };
-            format!(
-                "{besides} predicts these samples about as well as those that it was learned from{noise}: nothing needs to be done."
-            )
+            let noise =
+                if of_all.px > 0.0 || of_all.m > 0.0 { " but for the noise of what was read of the robot" } else { "" };
+            let verdict =
+                if misfits.is_empty() { in_noise(rig, evaluation) } else { ", and both too badly.".to_owned() };
+            format!("{besides} predicts these samples about as well as those that it was learned from{noise}{verdict}")
         } else {
             "The rig does not say what it was learned from; compare the distances with the noise of the detector."
                 .to_owned()
         });
     }
+    let reason = |misfit: &Finding| {
+        format!(
+            "Find the reason before the rig is relied on: {}. Learn again with the numbers free that `[estimate]` holds, or with `--estimate-noise`, \
+             and see whether the errors fall.",
+            misfit.of_evaluation()
+        )
+    };
+    steps.extend(misfits.iter().map(reason));
     if has_mistakes {
         steps.push(
             "The samples, images and detections that are named as not fitting are far off while the rest fits: they are mistakes of the \
@@ -177,4 +192,17 @@ pub fn evaluation_steps(rig: &Rig, evaluation: &Evaluation) -> Vec<String> {
         );
     }
     steps
+}
+
+/// What errors mean that are no larger than they were, in relation to the stated noise.
+fn in_noise(rig: &Rig, evaluation: &Evaluation) -> String {
+    let ratios = over_noise(&rig.noise, &evaluation.fitting.total, &evaluation.reading_noise.0);
+    match ratios.into_iter().max_by(|one, other| one.0.total_cmp(&other.0)) {
+        Some((ratio, stated)) if ratio > TOLD => format!(
+            ", with errors {ratio:.1} times the stated noise of {}: nothing has moved, and the noise is larger than stated or the rig leaves \
+             something out.",
+            stated.rounded()
+        ),
+        _ => ": nothing needs to be done.".to_owned(),
+    }
 }

@@ -3,7 +3,7 @@ use super::charts::histogram;
 use super::page::Page;
 use super::residuals::Residual;
 use super::sections::scales;
-use crate::calibrate::{Distance, Finding, Kind, is_wrong, yardstick};
+use crate::calibrate::{Distance, Finding, Kind, OverstatedNoise, is_wrong, yardstick};
 use crate::rig::Rig;
 use std::collections::BTreeMap;
 
@@ -14,8 +14,15 @@ const TAILS: f64 = 3.0;
 /// Errors of one image that go the same way this many times as much as independent ones do are not noise.
 const SHIFTED: f64 = 2.0;
 
-/// The answer, and the distances beside what Gaussian noise of their own size gives. `findings`: what was left out.
-pub(super) fn section(page: &mut Page, rig: &Rig, residuals: &[Residual], findings: &[Finding]) {
+/// The answer, and the distances beside what Gaussian noise of their own size gives. `findings`: what was left out; `overstated`: noise that is
+/// stated larger than it is.
+pub(super) fn section(
+    page: &mut Page,
+    rig: &Rig,
+    residuals: &[Residual],
+    findings: &[Finding],
+    overstated: &[OverstatedNoise],
+) {
     let sds = scales(rig, residuals);
     let used = in_use(rig, residuals, findings);
     if used.is_empty() {
@@ -27,6 +34,7 @@ pub(super) fn section(page: &mut Page, rig: &Rig, residuals: &[Residual], findin
         count => format!("The {count} detections that do not fit are not counted."),
     };
     page.paragraph(&format!("{} {left_out}", answer(&used, &sds).1));
+    page.list(&overstated.iter().map(|one| format!("But {one}.")).collect::<Vec<_>>());
     let coordinates: Vec<f64> = used.iter().flat_map(|residual| over_sd(residual, &sds)).collect();
     let gaussian = |x: f64| (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt();
     page.drawing(

@@ -99,7 +99,16 @@ impl Page {
 
     /// A table; the first column is words, the others are numbers.
     pub fn table<'a>(&mut self, header: &[&str], rows: impl IntoIterator<Item = &'a [String]>) {
-        self.body += "<div class=\"wide\"><table>\n<thead><tr>";
+        self.table_of("wide", header, rows);
+    }
+
+    /// A table of parameters before, as learned, and their standard deviations, which on a phone has a block per row.
+    pub fn values_table<'a>(&mut self, header: &[&str; 4], rows: impl IntoIterator<Item = &'a [String]>) {
+        self.table_of("wide values", header, rows);
+    }
+
+    fn table_of<'a>(&mut self, class: &str, header: &[&str], rows: impl IntoIterator<Item = &'a [String]>) {
+        let _ = write!(self.body, "<div class=\"{class}\"><table>\n<thead><tr>");
         for cell in header {
             let _ = write!(self.body, "<th>{}</th>", coded(cell));
         }

@@ -48,7 +48,7 @@ pub(super) fn table(page: &mut Page, subject: &Subject<'_>) {
     page.paragraph("In metres, radians and pixels; poses as translation and rotation vector. The last column is the standard deviation that \
                     the recording leaves; where it says assumed, the recording tells next to nothing, and the number is that of the prior. What hangs \
                     on such numbers, as features do on the frame of the last link, has their deviation too.");
-    page.table(&["", "before", "learned", "standard deviation"], rows.iter().map(Vec::as_slice));
+    page.values_table(&["", "before", "learned", "standard deviation"], rows.iter().map(Vec::as_slice));
 }
 
 /// The numbers of a parameter; `None` where it has no value.

@@ -1,14 +1,17 @@
-//! The answer in three lines: how well a rig fits, how well its tip is known, and what to do first.
+//! The answer in a few lines: where its cameras are, how well a rig fits, how well its tip is known, and what to do first.
 use super::calibration::Subject;
 use super::change;
 use super::noise;
 use super::page::Page;
 use super::residuals::Residual;
-use crate::calibrate::{Distance, Finding, Report, assumptions};
+use crate::calibrate::{CameraPose, Distance, Finding, Report, assumptions, camera_poses, overstated_noise};
 
 /// Said where errors do not look like noise.
 const OTHER_THAN_NOISE: &str =
     " The errors are not noise alone (see below), so what is given by the data is less certain than the figures say.";
+
+/// Cameras whose poses stand at the top.
+const CAMERAS: usize = 4;
 
 /// The first section of a page.
 pub(super) fn section(page: &mut Page, subject: &Subject<'_>, residuals: &[Residual]) {
@@ -16,7 +19,29 @@ pub(super) fn section(page: &mut Page, subject: &Subject<'_>, residuals: &[Resid
     let next = steps(subject).into_iter().next().unwrap_or_default();
     let is_noise = noise::is_alone(&subject.calibration.rig, residuals, &subject.calibration.report.findings);
     let fit = fit(subject) + if is_noise { "" } else { OTHER_THAN_NOISE };
-    page.list(&[fit, tip(subject), format!("What to do next: {next}")]);
+    let tables = subject.tables.iter().map(|table| table.in_short.clone()).filter(|words| !words.is_empty());
+    let overstated = overstated_noise(subject.calibration).into_iter().map(|one| format!("But {one}."));
+    let last = [tip(subject), format!("What to do next: {next}")];
+    cameras(page, subject);
+    page.list(&[fit].into_iter().chain(overstated).chain(tables).chain(last).collect::<Vec<_>>());
+}
+
+/// Where the cameras are, which is what most calibrate for; of many the summary tells.
+fn cameras(page: &mut Page, subject: &Subject<'_>) {
+    let poses = camera_poses(subject.calibration);
+    if poses.is_empty() || poses.len() > CAMERAS {
+        return;
+    }
+    let tiles = poses.iter().flat_map(|pose| {
+        let CameraPose { camera, on, sd, .. } = pose;
+        let [length, angle] = sd.map_or_else(<[String; 2]>::default, |sd| pose.sd_in_words(sd));
+        [
+            (format!("{} {length}", pose.centre_in_words()), format!("camera `{camera}`: x, y, z from {on}")),
+            (format!("{} {angle}", pose.turn_in_words()), format!("camera `{camera}`: turned by (rotation vector)")),
+        ]
+    });
+    let tiles: Vec<(String, String)> = tiles.collect();
+    page.figures(&tiles.iter().map(|(figure, what)| (figure.trim().to_owned(), what.as_str())).collect::<Vec<_>>());
 }
 
 /// How well it fits, beside what the noise lets expect, and what was left out.

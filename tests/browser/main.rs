@@ -51,6 +51,7 @@ addEventListener('load', () => {
     ratio: Math.round(1e3 * devicePixelRatio) / 1e3,
     ticks: document.body.innerText.includes('`'),
     folds: [...document.querySelectorAll('details')].every((one) => !one.open && one.querySelector('p').getBoundingClientRect().height === 0),
+    cut: [...document.querySelectorAll('.values td')].some((cell) => cell.getBoundingClientRect().right > root.clientWidth + 1),
     ink: getComputedStyle(document.body).color,
   });
 });
@@ -145,6 +146,8 @@ impl Pages {
                 (&false.into(), &true.into()),
                 "{width} px wide: {answer}"
             );
+            // What was learned can be read without scrolling.
+            assert_eq!(answer["cut"], false, "{width} px wide: {answer}");
             assert_eq!((&answer["drawings"], &answer["empty"]), (&drawings.into(), &0.into()), "{answer}");
             assert_eq!((&answer["labels"], &answer["ratio"]), (&cameras.into(), &RATIO.into()), "{answer}");
             // Names are code, and what is folded away takes no room.

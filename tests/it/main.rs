@@ -39,6 +39,7 @@ mod relearn;
 mod report;
 mod report_answers;
 mod report_evaluations;
+mod report_plain;
 mod report_words;
 mod rig_files;
 mod servo;
