@@ -23,9 +23,9 @@ pub(super) fn thin(recording: &Recording) -> Vec<usize> {
     };
     let take = |seen: &mut [usize], index: usize| shown(index).for_each(|feature| seen[feature] += 1);
     (0..n).filter(|&index| taken[index]).for_each(|index| take(&mut seen, index));
-    for index in 0..n {
-        if !taken[index] && shown(index).any(|feature| seen[feature] < OF_A_FEATURE) {
-            taken[index] = true;
+    for (index, taken) in taken.iter_mut().enumerate().filter(|(_, taken)| !**taken) {
+        if shown(index).any(|feature| seen[feature] < OF_A_FEATURE) {
+            *taken = true;
             take(&mut seen, index);
         }
     }
