@@ -200,11 +200,13 @@ class Recording:
         frames: tuple[str, str] | None = None,
         camera_topics: dict[str, str | None] | None = None,
         join: float | None = None,
+        joint_delay: float | None = None,
         degrees: bool | str | Sequence[str] | None = None,
         radians: bool = False,
         actions: Literal["targets", "motions"] | None = None,
         episodes: Sequence[int] | None = None,
         cameras: Mapping[str, _Camera | _Path] | None = None,
+        still: bool = False,
     ) -> Recording: ...
     @staticmethod
     def from_string(text: str, file_name: str = "recording.jsonl") -> Recording: ...

@@ -62,18 +62,19 @@ impl Recording {
     /// several of one robot are joined in their order.
     ///
     /// rig: its joints give names and order; joints: names from base to tip, of those in the file. cameras: name -> calibration file (YAML of ROS,
-    /// OpenCV or Kalibr), or what is known as in ``from_arrays``; a lens replaces that of the file.
+    /// OpenCV or Kalibr), or what is known as in ``from_arrays``; a lens replaces that of the file. still: one sample of each standstill of the
+    /// robot, and none of its motions.
     ///
     /// For bags: ``joint_topic`` and ``pose_topic``, where there are several; ``frames``, (base, tip) for tip poses from TF;
     /// ``camera_topics``, topic -> name of the camera or ``None`` (that of its frame); ``join`` [s], by how much images of one sample may
-    /// differ. For tables: ``degrees``, true or names, where joints are in degrees without saying so; ``radians``, where they are not even
+    /// differ; ``joint_delay`` [s], what is added to the stamps of the robot's states. For tables: ``degrees``, true or names, where joints are in degrees without saying so; ``radians``, where they are not even
     /// beyond two turns; ``actions``, whether LeRobot's are ``"targets"`` or ``"motions"`` (left out otherwise); ``episodes``, those to read.
     ///
     /// What has to be said of a file (states that were interpolated, samples left out) is in ``notes``, and comes as a warning. Raises
     /// ``UnusableInput`` with file, line and column for whatever is wrong inside, and for options without effect.
     #[staticmethod]
     #[pyo3(signature = (paths, *, rig = None, joint_topic = None, joints = None, pose_topic = None, frames = None, camera_topics = None, join = None,
-        degrees = None, radians = false, actions = None, episodes = None, cameras = None))]
+        joint_delay = None, degrees = None, radians = false, actions = None, episodes = None, cameras = None, still = false))]
     #[expect(clippy::too_many_arguments, reason = "one keyword per option")]
     fn load(
         py: Python<'_>,
@@ -85,11 +86,13 @@ impl Recording {
         frames: Option<[String; 2]>,
         camera_topics: Option<BTreeMap<String, Option<String>>>,
         join: Option<f64>,
+        joint_delay: Option<f64>,
         degrees: Option<Bound<'_, PyAny>>,
         radians: bool,
         actions: Option<&str>,
         episodes: Option<Vec<u64>>,
         cameras: Option<Bound<'_, PyDict>>,
+        still: bool,
     ) -> PyResult<Self> {
         let paths = match paths {
             Paths::One(path) => vec![path],
@@ -118,12 +121,14 @@ impl Recording {
                 .flatten()
                 .map(|(name, known)| read_camera(&name, &known))
                 .collect::<PyResult<_>>()?,
+            still,
             bag: BagOptions {
                 joint_topic,
                 pose_topic,
                 frames,
                 camera_topics: camera_topics.into_iter().flatten().collect(),
                 join,
+                joint_delay,
             },
             table: TableOptions { angles, actions, episodes: episodes.unwrap_or_default() },
         };

@@ -214,12 +214,25 @@ def test_options_of_other_formats_and_words_that_say_nothing_are_refused(motions
         ({"frames": ("base", "tip")}, "frames: none of the recordings is a bag, so that it has no effect"),
         ({"camera_topics": {"/tags": None}}, "camera_topics: none of the recordings is a bag"),
         ({"degrees": True}, "degrees: none of the recordings is a table"),
+        ({"joint_delay": 0.01}, "joint_delay: none of the recordings is a bag"),
         ({"joints": ["a"]}, "there is no joint `a`"),
         ({"episodes": [0]}, "episodes: none of the recordings is a table"),
         ({"cameras": {"nose": {"size": (640, 480)}}}, "there are no images of a camera `nose`"),
     ]:
         with pytest.raises(handeye.UnusableInput, match=message):
             handeye.Recording.load(path, **wrong)
+
+
+def test_one_sample_of_each_standstill_is_taken_where_asked_for(tmp_path):
+    times = np.arange(60) / 10
+    stops = np.floor(times) + np.clip(2 * (times % 1) - 1, 0, 1)  # half a second still, half a second on the way
+    paused = handeye.Recording.from_arrays(np.column_stack([stops, -stops]), times=times)
+    paused.save(tmp_path / "paused.jsonl")
+    with pytest.warns(UserWarning, match="the robot pauses 6 times"):
+        handeye.Recording.load(tmp_path / "paused.jsonl")
+    with pytest.warns(UserWarning, match="one sample of each standstill is taken: 6 of 60"):
+        still = handeye.Recording.load(tmp_path / "paused.jsonl", still=True)
+    np.testing.assert_array_equal(still.joints[:, 0], np.arange(6))
 
 
 def test_tables_say_their_units_actions_and_lenses_by_keywords(tmp_path):

@@ -2,7 +2,7 @@
 use super::answer::Answer;
 use super::counts::Counts;
 use super::inputs::{RigInput, eye_in_hand, read_rig, read_with_notes};
-use super::progress::Bar;
+use super::progress::Steps;
 use super::reading::Reading;
 use super::survey::Survey;
 use super::table::Table;
@@ -91,11 +91,17 @@ impl Check {
                 }
                 Err(error) => text += &format!("\nthe robot's state is not known: {error}\n"),
             }
-            let bar = Bar::new(is_json);
+            let mut steps = Steps::new(is_json);
             let diagnosis = examine_watched(rig, &recording, &Options::default(), &mut |hypothesis, progress| {
-                let _ = bar.show(&format!("{hypothesis}: "), progress);
+                steps.show(hypothesis, progress);
             });
-            drop(bar);
+            drop(steps);
+            if let Some(thinned_to) = diagnosis.thinned_to {
+                let samples = recording.samples.len();
+                text +=
+                    &format!("\nhypotheses are held against {thinned_to} of the {samples} samples, spread evenly\n");
+            }
+            json["thinned_to"] = json!(diagnosis.thinned_to);
             text += &format!("\n{}", tell(&diagnosis, &rig.noise));
             json["misfit_over_noise"] = json!(over_noise(&diagnosis, &rig.noise));
             json["scores"] = diagnosis

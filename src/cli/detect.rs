@@ -135,9 +135,9 @@ impl Detect {
             let (camera, folder) = named.map_or((None, image.as_str()), |(camera, folder)| (Some(camera), folder));
             folders.extend(Folder::open(Path::new(folder), camera)?);
         }
-        // What is known of cameras is known of those of the images.
-        let OpenOptions { cameras: known, .. } = options.clone();
-        let of_states = OpenOptions { cameras: Vec::new(), ..options };
+        // What is known of cameras is known of those of the images, which may be of some rows alone.
+        let OpenOptions { cameras: known, still, .. } = options.clone();
+        let of_states = OpenOptions { cameras: Vec::new(), still: false, ..options };
         let states = self.states.as_ref().map(|path| Recording::open_with(path, &of_states)).transpose()?;
         let (cameras, seen) = detect_in_folders(&folders, patterns)?;
         let pairing = match self.pair {
@@ -152,6 +152,9 @@ impl Detect {
             .map_err(|problem| Error::Unusable(format!("{place}: {problem}")))?;
         recording.describe_cameras(&known).map_err(|problem| Error::Unusable(format!("--camera: {problem}")))?;
         notes.extend(states.into_iter().flat_map(|Opened { notes, .. }| notes));
+        if still {
+            recording = recording.still().map_err(|problem| Error::Unusable(format!("{place}: {problem}")))?;
+        }
         Ok((recording, notes))
     }
 }

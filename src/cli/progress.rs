@@ -1,7 +1,9 @@
 //! Progress on standard error, where a person is watching.
 use handeye::calibrate::Progress;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::{self, IsTerminal};
 use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
 
 /// A progress bar, or nothing: with `--json`, and where standard error is no terminal.
 pub struct Bar(ProgressBar);
@@ -29,6 +31,33 @@ impl Bar {
 impl Drop for Bar {
     fn drop(&mut self) {
         self.0.finish_and_clear();
+    }
+}
+
+/// A bar for several calibrations; where standard error is no terminal a line now and then, and nothing with `--json`.
+pub struct Steps {
+    bar: Bar,
+    is_told: bool,
+    began: Instant,
+    last: Instant,
+}
+
+/// What takes longer says so once in this time.
+const BETWEEN_LINES: Duration = Duration::from_secs(30);
+
+impl Steps {
+    pub fn new(is_json: bool) -> Self {
+        let now = Instant::now();
+        Steps { bar: Bar::new(is_json), is_told: !is_json && !io::stderr().is_terminal(), began: now, last: now }
+    }
+
+    /// Shows which calibration is at what.
+    pub fn show(&mut self, which: &str, progress: &Progress<'_>) {
+        let _ = self.bar.show(&format!("{which}: "), progress);
+        if self.is_told && self.last.elapsed() > BETWEEN_LINES {
+            self.last = Instant::now();
+            eprintln!("after {:.0} s: {which}: {}", self.began.elapsed().as_secs_f64(), progress.stage);
+        }
     }
 }
 

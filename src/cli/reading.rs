@@ -23,6 +23,9 @@ pub struct OfFiles {
     /// What is known of a camera: the size of its images, or a calibration file (ROS, OpenCV, Kalibr), whose lens replaces any other
     #[arg(long, value_name = "NAME=WIDTHxHEIGHT|FILE")]
     camera: Vec<String>,
+    /// Take one sample of each standstill of the robot, and none of its motions
+    #[arg(long)]
+    still: bool,
     #[command(flatten)]
     bag: OfBags,
     #[command(flatten)]
@@ -45,11 +48,12 @@ impl Reading {
 
     /// What they say of the files that are read. Errors: for those that are nothing to any of the files.
     pub fn options(&self, files: &[&Path]) -> Result<OpenOptions, Error> {
-        let OfFiles { joints, camera, bag, table } = &self.of_files;
+        let OfFiles { joints, camera, still, bag, table } = &self.of_files;
         let options = OpenOptions {
             joints: joints.clone(),
             known_joints: Vec::new(),
             cameras: camera.iter().map(|text| read_camera(text)).collect::<Result<_, _>>()?,
+            still: *still,
             bag: bag.options(),
             table: TableOptions {
                 angles: table.angles(),
@@ -104,6 +108,9 @@ pub struct OfBags {
     /// Images at most this far apart make one sample [s] [default: half the time between two images, unless the robot moved between them]
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     join: Option<f64>,
+    /// Add this to the stamps of joint states, tip poses and TF, whose clock is that far behind the cameras' [s]
+    #[arg(long, value_name = "SECONDS", value_parser = finite, allow_negative_numbers = true)]
+    joint_delay: Option<f64>,
 }
 
 #[derive(Args, Clone, Default)]
@@ -146,6 +153,7 @@ impl OfBags {
             frames: self.base_frame.clone().zip(self.tip_frame.clone()).map(|(base, tip)| [base, tip]),
             camera_topics: self.camera_topic.iter().map(camera).collect(),
             join: self.join,
+            joint_delay: self.joint_delay,
         }
     }
 }
@@ -167,6 +175,11 @@ fn argument(option: &str) -> String {
         "camera_topics" => "--camera-topic".to_owned(),
         _ => format!("--{}", option.replace('_', "-")),
     }
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    let seconds = text.parse().ok().filter(|seconds: &f64| seconds.is_finite());
+    seconds.ok_or_else(|| "must be a number of seconds".to_owned())
 }
 
 fn seconds(text: &str) -> Result<f64, String> {

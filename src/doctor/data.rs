@@ -84,7 +84,10 @@ pub(crate) fn repeats(recording: &Recording) -> Option<Finding> {
     (f64::from(repeats) > REPEATED * f64::from(n)).then(|| Finding {
         about: About::Order,
         what: format!("{repeats} of {n} samples repeat the robot's state of an earlier one"),
-        change: "record more varied positions".into(),
+        change: match recording.pauses() {
+            Some(pauses) => format!("take one sample of each of the {pauses} pauses of the robot: --still does"),
+            None => "record more varied positions".into(),
+        },
     })
 }
 

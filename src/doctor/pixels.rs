@@ -1,7 +1,9 @@
 //! Which reading of joints or tip poses explains the pixels and points: a calibration per alternative.
 use super::alternatives::{self, Alternative};
 use super::images::{self, Axes};
-use super::{About, Diagnosis, Finding, Misfit, Score, Watch, is_clearly_better, lag};
+use super::lag::Motion;
+use super::thin::{thin, thinned};
+use super::{About, Diagnosis, Finding, Misfit, Score, Watch, is_clearly_better};
 use crate::Error;
 use crate::calibrate::{self, Calibration, Errors, Finding as Unfit, calibrate, evaluate};
 use crate::recording::Recording;
@@ -17,25 +19,28 @@ const FINER: f64 = 0.8;
 /// Adds scores and findings.
 pub(super) fn examine(
     rig: &Rig,
-    recording: &Recording,
+    whole: &Recording,
     options: &calibrate::Options,
     diagnosis: &mut Diagnosis,
     watch: &mut Watch<'_>,
 ) {
+    let kept = thin(whole);
+    let recording = &whole.select(|index| kept.binary_search(&index).is_ok());
+    diagnosis.thinned_to = (kept.len() < whole.samples.len()).then_some(kept.len());
     let axes = images::axes(rig, recording);
     let (axes_name, axes_change) = ("u and v are swapped", "write pixels as [u, v]: u to the right, v down");
     if axes == Axes::Swapped {
         diagnosis.findings.push(finding(axes_name, axes_change));
         return;
     }
-    let (as_recorded, found) = match learn(rig, recording, options, "as recorded", watch) {
-        Ok(learned) => (median(&learned.rig, recording), learned.report.findings),
+    let (as_recorded, learned, found) = match learn(rig, recording, options, "as recorded", watch) {
+        Ok(learned) => (median(&learned.rig, recording), Some(learned.rig), learned.report.findings),
         Err(error) => {
             diagnosis.unsolved = Some(error.to_string());
             if error.is_input() {
                 return;
             }
-            (None, Vec::new())
+            (None, None, Vec::new())
         }
     };
     diagnosis.scores.push(Score { alternative: "as recorded".into(), misfit: as_recorded });
@@ -67,33 +72,37 @@ pub(super) fn examine(
     let explains = |misfit: &Misfit| misfit.is_explained(&rig.noise);
     let is_fine = |best: &Option<(Misfit, Finding)>| best.as_ref().is_some_and(|(misfit, _)| explains(misfit));
     if !is_fine(&best) && !as_recorded.as_ref().is_some_and(explains) {
-        for alternative in alternatives::all(rig, recording) {
-            let misfit = score(&alternative.rig, &alternative.recording, options, &alternative.name, watch);
+        for alternative in alternatives::all(rig, whole) {
+            let recording = thinned(&alternative.recording);
+            let misfit = score(&alternative.rig, &recording, options, &alternative.name, watch);
             consider(alternative, misfit, as_recorded, &rig.noise, &mut best, diagnosis);
             if is_fine(&best) {
                 break;
             }
         }
-        if let Some(lag) = (!is_fine(&best)).then(|| lag::find(rig, recording, options, watch)).flatten() {
-            let misfit = score(rig, &lag.recording, options, "a lag", watch);
-            let (by, side) = (lag.seconds.abs(), if lag.seconds > 0.0 { "late" } else { "early" });
-            let name = format!("joints are stamped {by:.3} s too {side}");
-            let sign = if lag.seconds > 0.0 { "subtract" } else { "add" };
-            let change =
-                format!("{sign} {by:.3} s {} the stamps of the joints", if sign == "add" { "to" } else { "from" });
-            diagnosis.scores.push(Score { alternative: name.clone(), misfit });
-            let beaten = best.as_ref().map(|(best, _)| FINER * best.size());
-            if let Some(misfit) = misfit.filter(|misfit| is_right(About::Order, *misfit, as_recorded, &rig.noise))
-                && beaten.is_none_or(|beaten| misfit.size() < beaten)
-            {
-                best = Some((misfit, finding(&name, &change)));
-            }
+    }
+    let motion = Motion::new(whole).zip(learned.as_ref()).filter(|(motion, learned)| {
+        !is_fine(&best) && (!as_recorded.as_ref().is_some_and(explains) || motion.shows_lag(learned))
+    });
+    if let Some(lag) = motion.and_then(|(motion, learned)| motion.lag(rig, learned, options, watch)) {
+        let misfit = score(rig, &lag.recording, options, "a lag", watch);
+        let Finding { what, .. } = of_lag(lag.seconds);
+        diagnosis.scores.push(Score { alternative: what.clone(), misfit });
+        let [as_it_moves, without] = lag.misfits;
+        diagnosis.scores.push(Score { alternative: "as recorded, where it moves fastest".into(), misfit: as_it_moves });
+        diagnosis.scores.push(Score { alternative: format!("{what}, where it moves fastest"), misfit: without });
+        let beaten = best.as_ref().map(|(best, _)| FINER * best.size());
+        let is_lag = is_clearly_better(without, as_it_moves);
+        if let Some(misfit) = misfit.filter(|misfit| is_lag || is_right(About::Order, *misfit, as_recorded, &rig.noise))
+            && beaten.is_none_or(|beaten| misfit.size() < beaten)
+        {
+            best = Some((misfit, of_lag(lag.seconds)));
         }
     }
     match best {
         Some((_, finding)) => diagnosis.findings.push(finding),
         // Single rows are judged by a fit, which says nothing where all of the data are wrong.
-        None => diagnosis.findings.extend(found.iter().filter_map(swapped)),
+        None => diagnosis.findings.extend(found.iter().filter_map(|unfit| swapped(unfit, &kept))),
     }
 }
 
@@ -121,14 +130,28 @@ fn is_right(about: About, misfit: Misfit, reference: Option<Misfit>, noise: &Noi
     is_clearly_better(Some(misfit), reference) && ((reference.is_some() && about != About::Joints) || fits())
 }
 
-/// Rows of joints or tip poses that the calibration itself found to be exchanged.
-fn swapped(unfit: &Unfit) -> Option<Finding> {
+/// Rows of joints or tip poses that the calibration itself found to be exchanged; `kept`: indices of the samples that it saw.
+fn swapped(unfit: &Unfit, kept: &[usize]) -> Option<Finding> {
     let Unfit::WrongJoints { sample, swapped_with: Some(other), by_pose, .. } = unfit else { return None };
     let (rows, read) = if *by_pose { ("robot poses", "robot poses") } else { ("joint rows", "joints") };
+    let [sample, other] = [kept.get(*sample)?, kept.get(*other)?];
     (sample < other).then(|| {
         let what = format!("the {rows} of samples {sample} and {other} are swapped");
         finding(&what, &format!("exchange the {read} of the two samples"))
     })
+}
+
+/// `seconds`: by how much joints are stamped late.
+fn of_lag(seconds: f64) -> Finding {
+    let by = seconds.abs();
+    let (side, to) = if seconds > 0.0 { ("late", "subtract") } else { ("early", "add") };
+    let stamps = if seconds > 0.0 { "from the stamps" } else { "to the stamps" };
+    // A sum with zero is never negative zero.
+    let delay = format!("--joint-delay {:.3}", 0.0 - seconds);
+    finding(
+        &format!("joints are stamped {by:.3} s too {side}"),
+        &format!("{to} {by:.3} s {stamps} of the joints; a bag is read so with {delay}"),
+    )
 }
 
 fn finding(what: &str, change: &str) -> Finding {

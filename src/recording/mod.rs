@@ -16,6 +16,7 @@ mod open;
 mod order;
 mod same_joints;
 mod select;
+mod standstill;
 mod table;
 mod track;
 mod types;

@@ -48,6 +48,8 @@ pub struct OpenOptions {
     pub known_joints: Vec<String>,
     /// What is known of cameras, by name: a lens replaces what the file says of it, a size has to be that of the images, or of the CameraInfo.
     pub cameras: Vec<RecordedCamera>,
+    /// One sample of each standstill in place of all, see [`Recording::still`].
+    pub still: bool,
     /// Of bags.
     pub bag: BagOptions,
     /// Of tables.
@@ -59,7 +61,8 @@ pub struct OpenOptions {
 pub struct Opened {
     /// The recording.
     pub recording: Recording,
-    /// What was left out, taken for granted, interpolated or put into the order of known joints, and where the file ends early: one line each.
+    /// What was left out, taken for granted, interpolated or put into the order of known joints, that there are pauses, and where the file ends
+    /// early: one line each.
     pub notes: Vec<String>,
     /// For each sample the name of the image that it goes with, without folder and ending, where a CSV file has a column `image`; otherwise empty.
     pub images: Vec<String>,
@@ -69,7 +72,7 @@ impl Recording {
     /// Reads a recording in any [`Format`].
     ///
     /// Errors: those of [`Recording::read`]; [`Error::Malformed`] with line and column of a CSV file; [`Error::Unusable`] with row and column of
-    /// a Parquet file, with topic and message of a bag, and for options that name what the file does not have.
+    /// a Parquet file, with topic and message of a bag, and for options that name what the file does not have, standstills too.
     pub fn open_with(path: &Path, options: &OpenOptions) -> Result<Opened, Error> {
         let opened = open(path, options)?;
         opened.with_cameras(&path.display().to_string(), options)
@@ -107,6 +110,11 @@ impl Opened {
 
 /// The same where cameras of which the options say something may be missing.
 fn open(path: &Path, options: &OpenOptions) -> Result<Opened, Error> {
+    open_whole(path, options)?.still(path, options)
+}
+
+/// The same with all samples.
+fn open_whole(path: &Path, options: &OpenOptions) -> Result<Opened, Error> {
     match Format::of(path) {
         Format::JsonLines => {
             let mut recording = Recording::read(path)?;

@@ -45,7 +45,7 @@ pub fn joint_state(stamp: u64, names: &[String], positions: &[f64]) -> Vec<u8> {
 const EVERY: u64 = 100_000_000;
 
 /// The recording as a bag: joints at the stamps of images, tags of one feature per corner.
-fn bag(recording: &Recording, options: WriteOptions, shuffled: bool) -> Vec<u8> {
+pub fn bag(recording: &Recording, options: WriteOptions, shuffled: bool) -> Vec<u8> {
     let mut writer = options.create(Cursor::new(Vec::new())).unwrap();
     let mut channel = |topic: &str, kind: &str, text: String| {
         let schema = writer.add_schema(kind, "ros2msg", text.as_bytes()).unwrap();

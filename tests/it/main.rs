@@ -51,6 +51,7 @@ mod servo_memory;
 mod servo_singular;
 mod servo_stops;
 mod simulate;
+mod standstills;
 mod states;
 mod suggest;
 mod tables;

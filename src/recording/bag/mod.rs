@@ -18,7 +18,7 @@ mod value;
 
 use super::clock::{nanoseconds, seconds};
 use super::groups::{Group, groups, moments, samples, split};
-use super::whereabouts::note_on_apart;
+use super::whereabouts::{Whereabouts, note_on_apart};
 use super::{OpenOptions, Opened, Recording};
 use crate::Error;
 pub(super) use folder::is_bag;
@@ -42,6 +42,9 @@ pub struct BagOptions {
     /// Images of several cameras at most this far apart make one sample [s]; `None`: half the time between two images, unless the robot moved
     /// between them.
     pub join: Option<f64>,
+    /// What is added to the stamps of joint states, tip poses and TF before they are interpolated to those of images [s]; negative where they are
+    /// stamped too late.
+    pub joint_delay: Option<f64>,
 }
 
 /// What was found in an image.
@@ -66,7 +69,7 @@ impl Recording {
         options: &'a OpenOptions,
         detect: &'a mut Detect<'a>,
     ) -> Result<Opened, Error> {
-        read(path, options, Some(detect))?.with_cameras(&path.display().to_string(), options)
+        read(path, options, Some(detect))?.still(path, options)?.with_cameras(&path.display().to_string(), options)
     }
 }
 
@@ -97,7 +100,12 @@ pub(super) fn read<'a>(
         return Err(Error::Unusable(format!("{}: {problem}", path.display())));
     }
     let robot = Robot::new(path, options, &images)?;
-    let (whereabouts, messages) = robot.read(&files, moments(&groups, &images.images))?;
+    let moments = moments(&groups, &images.images);
+    // By the robot's clock.
+    let delay = options.bag.joint_delay.map_or(0, nanoseconds);
+    let theirs = moments.iter().map(|moment| moment.saturating_sub(delay)).collect();
+    let (whereabouts, messages) = robot.read(&files, theirs)?;
+    let whereabouts = Whereabouts { moments, ..whereabouts };
     let (groups, apart) = match options.bag.join {
         Some(_) => (groups, 0),
         None => split(groups, &images.images, |first, last| whereabouts.moved(first, last)),
