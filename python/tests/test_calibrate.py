@@ -158,10 +158,10 @@ def test_a_measured_length_tells_how_large_everything_is(motions, ur5):
 
 
 def test_cameras_that_no_rig_lists_are_put_on_the_hand(ur5, motions):
-    # These stand in the world, so that nothing fits where they are taken to be on the hand.
-    wrong = handeye.calibrate(motions, "ur5_arm", eye_in_hand=True)
-    assert wrong.rig.parent("cameras.left") == "tip" and wrong.rig.parent("features.f0") == "world"
-    assert wrong.rms_px > 10.0 * handeye.calibrate(motions, "ur5_arm").rms_px
+    # These stand in the world, so that nothing can be learned where they are taken to be on the hand.
+    assert handeye.calibrate(motions, "ur5_arm").converged
+    with pytest.raises(handeye.NotDone):
+        handeye.calibrate(motions, "ur5_arm", eye_in_hand=True)
     with pytest.raises(handeye.UnusableInput, match="eye_in_hand: the rig lists every camera"):
         handeye.calibrate(motions, ur5, eye_in_hand=True)
 
