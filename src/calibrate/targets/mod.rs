@@ -223,7 +223,7 @@ fn first_state(setup: &Setup, start: &Start, offset: f64) -> State {
         sigmas: [rot, rot, rot, xyz, xyz, xyz],
         walks: [0.0; 2],
         drifts: vec![[0.0; 6]; setup.views.len()],
-        spread: spread::FIRST,
+        spread: spread::START,
         shown: [1.0; 6],
     }
 }

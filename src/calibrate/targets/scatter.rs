@@ -70,6 +70,8 @@ pub(super) fn shown(setup: &Setup, built: &Built, state: &State, covariance: &mu
         }
         n += 1.0;
     }
+    let turn = leverages[..3].iter().sum::<f64>() / 3.0;
+    leverages[..3].fill(turn);
     leverages.map(|leverage| (1.0 - leverage / n.max(1.0)).max(LEAST_SHOWN).sqrt())
 }
 

@@ -5,8 +5,11 @@ use crate::chain::LINK_PARAMETERS;
 use crate::rig::{JointField, Parameter};
 use handeye_solvers::Covariance;
 
+/// What an arm is taken to be off at first [rad, m]: from above, few rounds come near what the data say.
+pub(super) const START: [f64; 2] = [5e-4, 3e-4];
+
 /// What an arm is off before anything is estimated [rad, m], and how many parameters that is worth against those of the rig.
-pub(super) const FIRST: [f64; 2] = [1e-4, 6e-5];
+const FIRST: [f64; 2] = [1e-4, 6e-5];
 const WORTH: f64 = 1.0;
 
 /// One step of MacKay's fixed point for the standard deviations of angles and of lengths around the given values:
