@@ -72,7 +72,7 @@ impl Suggest {
             check_output(output, &inputs)?;
         }
         let options = SuggestOptions { count: self.count, seed: self.seed, near: self.near, above: self.above };
-        let known = known.map(|known| with_lengths(known.rig, &input.rig));
+        let known = known.map(|known| as_learned(known.rig, &input.rig));
         let suggestion = suggest(&input.rig, recording.as_ref(), known.as_ref(), &options)?;
         let mut answer = Answer::new(text(&input.rig, &suggestion), json(&suggestion));
         if let Some(output) = &self.output {
@@ -85,8 +85,13 @@ impl Suggest {
     }
 }
 
-/// The rig that was given, with what was measured besides when the other was learned.
-fn with_lengths(mut given: Rig, learned: &Rig) -> Rig {
+/// The rig that was given, with what was said besides when the other was learned: measured lengths, and where cameras are that it does not list.
+fn as_learned(mut given: Rig, learned: &Rig) -> Rig {
+    for Camera { name, parent, .. } in &learned.cameras {
+        if !given.cameras.iter().any(|camera| camera.name == *name) {
+            given.cameras.push(Camera { name: name.clone(), parent: *parent, ..Camera::default() });
+        }
+    }
     given.estimate.tag_side = given.estimate.tag_side.or(learned.estimate.tag_side);
     let of_given = std::mem::take(&mut given.estimate.lengths);
     learned.estimate.lengths.iter().cloned().chain(of_given).for_each(|length| given.estimate.measure(length));

@@ -49,12 +49,7 @@ pub(super) fn all(rig: &Rig, recording: &Recording) -> Vec<Alternative> {
             ..as_recorded(About::Order, &name, &change)
         });
     }
-    for (name, change, order) in undo::joint_orders(rig, recording) {
-        all.push(Alternative {
-            recording: undo::reordered(recording, &order),
-            ..as_recorded(About::Joints, &name, &change)
-        });
-    }
+    // Joints from tip to base are nearly the same as the other side, which is the likelier mistake.
     let recording_alone = rig.cameras.is_empty() && rig.features.is_empty();
     all.extend(other_side(rig, recording).map(|(rig, declared, parent)| {
         let name = format!("cameras that are declared {declared} move as if they were not");
@@ -66,6 +61,12 @@ pub(super) fn all(rig: &Rig, recording: &Recording) -> Vec<Alternative> {
         }
         Alternative { rig, ..as_recorded(About::Order, &name, &change) }
     }));
+    for (name, change, order) in undo::joint_orders(rig, recording) {
+        all.push(Alternative {
+            recording: undo::reordered(recording, &order),
+            ..as_recorded(About::Joints, &name, &change)
+        });
+    }
     all
 }
 

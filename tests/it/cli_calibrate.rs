@@ -68,6 +68,7 @@ fn a_camera_on_the_hand_needs_one_word() {
     assert!(out.contains("move as if they were not") && out.contains("or say --eye-in-hand"), "{out}");
     let (out, _) = folder.expect(0, "check arm.toml rec.jsonl --eye-in-hand");
     assert!(out.contains("no mistake"), "{out}");
+    folder.expect(0, "suggest learned.toml --count 1 --with rec.jsonl --rig arm.toml");
     let (_, err) = folder.expect(2, "calibrate rec.jsonl --rig learned.toml --eye-in-hand -o x.toml");
     assert!(err.contains("--eye-in-hand has no effect"), "{err}");
 }
