@@ -10,9 +10,10 @@ const MISFIT: f64 = 3.0;
 /// the stated noise.
 pub(crate) fn over_noise(noise: &Noise, errors: &Errors, of_readings: &ReadingNoise) -> [(f64, Distance); 2] {
     Kind::ALL.map(|kind| {
-        let (rms, sd, of_readings) = match kind {
-            Kind::Pixels => (errors.rms_px, noise.pixels, of_readings.px),
-            Kind::Points => (errors.points.rms_m, noise.points, of_readings.m),
+        let sd = kind.sd(noise);
+        let (rms, of_readings) = match kind {
+            Kind::Pixels => (errors.rms_px, of_readings.px),
+            Kind::Points => (errors.points.rms_m, of_readings.m),
         };
         (rms / (kind.coordinates().sqrt() * sd).hypot(of_readings), kind.distance(sd))
     })

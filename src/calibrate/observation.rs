@@ -1,6 +1,6 @@
 //! What a camera says of a feature, and how far that is from what a model predicts.
 use super::Distance;
-use crate::rig::Model;
+use crate::rig::{Model, Noise};
 use handeye_solvers::Pose;
 use nalgebra::Vector3;
 
@@ -45,6 +45,14 @@ impl Kind {
         match self {
             Kind::Pixels => 1.177_410_022_515_474_6,
             Kind::Points => 1.538_172_254_455_209_3,
+        }
+    }
+
+    /// Stated standard deviation of a coordinate [px, or m]; exact detections are not weighed without bound.
+    pub fn sd(self, noise: &Noise) -> f64 {
+        match self {
+            Kind::Pixels => noise.pixels.max(1e-3),
+            Kind::Points => noise.points.max(1e-6),
         }
     }
 

@@ -31,10 +31,8 @@ pub fn overstated_noise(calibration: &Calibration) -> Vec<OverstatedNoise> {
     let all: f64 = Kind::ALL.iter().zip(counts).map(|(kind, count)| kind.coordinates() * count as f64).sum();
     let share = 1.0 - free as f64 / all.max(1.0);
     let of_kind = |(kind, count): (Kind, usize)| {
-        let (rms, sd) = match kind {
-            Kind::Pixels => (report.rms_px, rig.noise.pixels),
-            Kind::Points => (report.points.rms_m, rig.noise.points),
-        };
+        let sd = kind.sd(&rig.noise);
+        let rms = if kind == Kind::Pixels { report.rms_px } else { report.points.rms_m };
         let left = share * kind.coordinates() * count as f64;
         let shown = rms / (kind.coordinates() * share).sqrt();
         let is_clear = left > 0.0 && shown > 0.0 && shown / sd < CLEAR.min(1.0 - 3.0 / (2.0 * left).sqrt());

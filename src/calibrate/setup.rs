@@ -106,10 +106,7 @@ impl Setup {
 
     /// Standard deviation of a coordinate of a detection [px, or m].
     pub fn sd(&self, kind: Kind) -> f64 {
-        match kind {
-            Kind::Pixels => self.rig.noise.pixels.max(1e-3),
-            Kind::Points => self.rig.noise.points.max(1e-6),
-        }
+        kind.sd(&self.rig.noise)
     }
 
     /// The detections of one sample.

@@ -107,9 +107,6 @@ fn metres(text: &str) -> Result<[f64; 2], String> {
     number(length).zip(sd).map(Into::into).ok_or_else(|| "expected lengths above 0, in metres".to_owned())
 }
 
-/// Errors of so many times the noise are those of a model that is wrong.
-const MISFIT: f64 = 10.0;
-
 impl Calibrate {
     pub fn run(&self, is_json: bool, typed: &str) -> Result<Answer, Error> {
         let input = self.rig.as_deref().map(read_rig).transpose()?;
@@ -187,19 +184,14 @@ impl Calibrate {
                 "{output} was not written: {reason}; more varied motions, or a rig that gives more, would do"
             ));
         }
-        if report.targets.is_none() && (!report.converged || report.rms_px > MISFIT * rig.noise.pixels) {
-            let side = "cameras that no rig lists are taken to stand in the world: where they are on the hand, say --eye-in-hand (handeye check \
-                        RIG REC tries that and other mistakes)";
-            let names = is_any_robot.then(|| unsaid::known_names(&recording)).flatten();
-            let hints: Vec<String> = (!places_cameras).then(|| side.to_owned()).into_iter().chain(names).collect();
-            for hint in &hints {
-                match &mut answer.failure {
-                    Some(failure) => *failure += &format!("; {hint}"),
-                    None => answer.text += &format!("\n{hint}\n"),
-                }
+        let hints = unsaid::hints(&recording, report, is_any_robot, places_cameras);
+        for hint in &hints {
+            match &mut answer.failure {
+                Some(failure) => *failure += &format!("; {hint}"),
+                None => answer.text += &format!("\n{hint}\n"),
             }
-            answer.json["hints"] = json!(hints);
         }
+        answer.json["hints"] = json!(hints);
         if let Some(path) = &self.report {
             let title = format!("{}, learned from {}", file_name(&self.output), file_names(&self.recordings));
             let tables = folds.iter().map(Folds::as_table).collect::<Vec<_>>();

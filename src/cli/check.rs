@@ -147,7 +147,8 @@ fn tell(diagnosis: &Diagnosis, noise: &Noise) -> String {
     let fits = fits.map(|(misfit, expected, ratio)| {
         let is_explained = misfit.is_explained(noise);
         text += &if is_explained {
-            format!("\nas recorded it fits: {misfit}, where the rig's [noise] leaves {expected}\n")
+            let in_the_median = if diagnosis.findings.is_empty() { "" } else { " in the median" };
+            format!("\nas recorded it fits{in_the_median}: {misfit}, where the rig's [noise] leaves {expected}\n")
         } else {
             format!("\nas recorded it does not fit: {misfit} is {ratio:.1} times the {expected} that the rig's [noise] leaves\n")
         };

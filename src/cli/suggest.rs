@@ -17,8 +17,8 @@ use std::path::PathBuf;
 ///
 /// The positions that shrink the uncertainty of the tip's position most, within the joints' limits (else the range that they were
 /// in while the rig was learned) and with at least half of the features in view of a camera, on the side on which they were seen.
-/// Nothing is known of obstacles but what --above and --near say: look at every position before the robot goes there. Without --with it is a ranking: the standard
-/// deviations of a rig do not say what moves together, and every feature counts as seen from all sides.
+/// Nothing is known of obstacles but what --above and --near say: look at every position before the robot goes there. Without --with
+/// it is a ranking: the standard deviations of a rig do not say what moves together, and every feature counts as seen from all sides.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

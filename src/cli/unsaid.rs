@@ -1,16 +1,17 @@
-//! What a recording that is learned from alone says of the robot: joints that never move, and whose names they are.
+//! What to look at of all that was not said of the robot: joints that never move, whose names they are, and where the cameras are.
 use super::words::list;
+use handeye::calibrate::{Finding, Report};
 use handeye::recording::Recording;
 use handeye::rig::{Rig, catalog};
 
-/// Readings within this are of a joint that stands still [rad or m].
-const UNMOVED: f64 = 1e-4;
-
 /// Joints that stand still, which are hardly the arm's.
 pub fn still_joints(recording: &Recording) -> Option<String> {
-    let still = still(recording);
-    let is_moving = |joint: &&String| !still.contains(joint);
-    let moving: Vec<&str> = recording.joints.iter().filter(is_moving).map(String::as_str).collect();
+    let still = recording.still_joints();
+    let names = |is_still: bool| -> Vec<String> {
+        let joints = recording.joints.iter().enumerate();
+        joints.filter(|(joint, _)| still.contains(joint) == is_still).map(|(_, name)| name.clone()).collect()
+    };
+    let (still, moving) = (names(true), names(false));
     (!still.is_empty() && !moving.is_empty()).then(|| {
         format!(
             "joints that never move: {}; where they are not the arm's, as a gripper's are not, --joints {} leaves them out{}",
@@ -21,8 +22,20 @@ pub fn still_joints(recording: &Recording) -> Option<String> {
     })
 }
 
+/// What may be wrong where a fit is far off, for all that was not said: of any robot, and of where the cameras are.
+pub fn hints(recording: &Recording, report: &Report, is_any_robot: bool, places_cameras: bool) -> Vec<String> {
+    let is_misfit = |finding: &Finding| matches!(finding, Finding::Misfit { .. });
+    if report.targets.is_some() || (report.converged && !report.findings.iter().any(is_misfit)) {
+        return Vec::new();
+    }
+    let side = "cameras that no rig lists are taken to stand in the world: where they are on the hand, say --eye-in-hand (handeye check RIG REC \
+                tries that and other mistakes)";
+    let names = is_any_robot.then(|| known_names(recording)).flatten();
+    (!places_cameras).then(|| side.to_owned()).into_iter().chain(names).collect()
+}
+
 /// The shipped rigs whose joints are called as those of the recording.
-pub fn known_names(recording: &Recording) -> Option<String> {
+fn known_names(recording: &Recording) -> Option<String> {
     let shipped = shipped(recording);
     (!shipped.is_empty()).then(|| {
         format!(
@@ -30,17 +43,6 @@ pub fn known_names(recording: &Recording) -> Option<String> {
             shipped.join(", ")
         )
     })
-}
-
-fn still(recording: &Recording) -> Vec<String> {
-    let read = || recording.samples.iter().filter_map(|sample| sample.joints.as_ref());
-    let range = |joint: usize| {
-        let readings = read().map(|joints| joints[joint]);
-        readings.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
-    };
-    let is_still = |(low, high): (f64, f64)| high - low < UNMOVED;
-    let joints = recording.joints.iter().enumerate();
-    joints.filter(|(joint, _)| read().count() > 1 && is_still(range(*joint))).map(|(_, name)| name.clone()).collect()
 }
 
 /// Shipped rigs of which every joint's name is part of one of the recording's; the number of a joint alone tells nothing.

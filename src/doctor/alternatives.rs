@@ -50,13 +50,13 @@ pub(super) fn all(rig: &Rig, recording: &Recording) -> Vec<Alternative> {
         });
     }
     // Joints from tip to base are nearly the same as the other side, which is the likelier mistake.
-    let recording_alone = rig.cameras.is_empty() && rig.features.is_empty();
+    let lists_none = rig.cameras.is_empty() && rig.features.is_empty();
     all.extend(other_side(rig, recording).map(|(rig, declared, parent)| {
         let name = format!("cameras that are declared {declared} move as if they were not");
         let other = if parent == "tip" { "world" } else { "tip" };
         let mut change =
             format!("set the parent of the cameras to \"{parent}\", and that of the features to \"{other}\"");
-        if parent == "tip" && recording_alone {
+        if parent == "tip" && lists_none {
             change += ", or say --eye-in-hand";
         }
         Alternative { rig, ..as_recorded(About::Order, &name, &change) }

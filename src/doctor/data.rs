@@ -17,9 +17,6 @@ const TURN: f64 = 0.05;
 /// Turns below this [rad, rms] may be the noise of arms and trackers.
 const NOISE: f64 = 0.01;
 
-/// A joint whose readings are all within this of one another [rad, m] was not moved: encoders are as noisy.
-const UNMOVED: f64 = 1e-3;
-
 /// No arm reaches so far, and no target is so far away [m].
 const FAR: f64 = 20.0;
 
@@ -92,16 +89,14 @@ pub(crate) fn repeats(recording: &Recording) -> Option<Finding> {
 }
 
 fn one_joint(recording: &Recording) -> Option<Finding> {
-    let read: Vec<&Vec<f64>> = recording.samples.iter().filter_map(|sample| sample.joints.as_ref()).collect();
-    let moves = |joint: &usize| {
-        let readings = || read.iter().map(|joints| joints[*joint]);
-        readings().fold(f64::NEG_INFINITY, f64::max) - readings().fold(f64::INFINITY, f64::min) > UNMOVED
-    };
-    let moving: Vec<usize> = (0..recording.joints.len()).filter(moves).collect();
+    let read = recording.samples.iter().filter(|sample| sample.joints.is_some()).count();
+    let still = recording.still_joints();
+    let moving: Vec<&String> =
+        recording.joints.iter().enumerate().filter(|(joint, _)| !still.contains(joint)).map(|(_, name)| name).collect();
     let what = match moving[..] {
-        _ if read.len() < 2 || recording.joints.len() < 2 => return None,
+        _ if read < 2 || recording.joints.len() < 2 => return None,
         [] => "no joint moves".to_owned(),
-        [joint] => format!("only joint {} moves", recording.joints[joint]),
+        [joint] => format!("only joint {joint} moves"),
         _ => return None,
     };
     Some(Finding { about: About::Order, what, change: "record positions in which all joints differ".into() })

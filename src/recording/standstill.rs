@@ -52,6 +52,17 @@ impl Recording {
         found.into_iter().map(|run| moments[run.start].index..moments[run.end - 1].index + 1).collect()
     }
 
+    /// Joints, by their places, that stay where they are in all samples, within 0.001 rad or m; none where fewer than two are read.
+    pub fn still_joints(&self) -> Vec<usize> {
+        let read: Vec<&Vec<f64>> = self.samples.iter().filter_map(|sample| sample.joints.as_ref()).collect();
+        let is_still = |joint: &usize| {
+            let readings = || read.iter().map(|joints| joints[*joint]);
+            let (low, high) = (readings().fold(f64::INFINITY, f64::min), readings().fold(f64::NEG_INFINITY, f64::max));
+            high - low <= UNMOVED
+        };
+        (0..self.joints.len()).filter(|joint| read.len() > 1 && is_still(joint)).collect()
+    }
+
     /// One sample of each standstill: in the middle half of its time the one with most detections, of those the one next to its middle.
     ///
     /// Errors: in words, where there is no standstill, or nothing by which it could be known.

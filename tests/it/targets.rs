@@ -163,6 +163,33 @@ fn stated_noise_of_robot_and_targets_gives_honest_standard_deviations() {
     assert!((120.0..400.0).contains(&sum), "{sum}");
 }
 
+/// What a fit takes up of the noise is missing in its residuals: of 8 views a sixth of the variance... deviations say it all the same.
+#[test]
+fn noise_that_is_not_stated_is_not_taken_for_less_where_views_are_few() {
+    let target = PoseNoise { xyz: 0.002, rot: 0.004 };
+    let (mut logs, mut n) = (0.0, 0.0);
+    for seed in 0..100 {
+        let mut random = ChaCha8Rng::seed_from_u64(900 + seed);
+        let world = world(&mut random, seed % 2 == 0);
+        let samples = (0..8)
+            .map(|_| {
+                let tip = pose(&mut random, 1.0, 0.3);
+                world.sample(&mut random, tip, Spoilt { target, ..Spoilt::default() })
+            })
+            .collect();
+        let (recording, mut rig) = (recording(samples), world.rig());
+        let sds = |rig: &Rig| learn(rig, &recording).rig.fit.unwrap().sd["cameras.camera.pose"].clone();
+        let estimated = sds(&rig);
+        rig.noise.target = Some(target);
+        for (estimated, stated) in estimated.iter().zip(sds(&rig)) {
+            logs += (estimated / stated).ln();
+            n += 1.0;
+        }
+    }
+    let ratio = f64::exp(logs / n);
+    assert!((0.93..1.07).contains(&ratio), "deviations are {ratio} times those of the true noise");
+}
+
 /// Medians over the seeds of the camera's error of place [m], with the covariances of detections passed on and without.
 fn with_and_without_covariances(seeds: u64) -> [f64; 2] {
     let mut found: [Vec<f64>; 2] = Default::default();
