@@ -163,7 +163,7 @@ fn stated_noise_of_robot_and_targets_gives_honest_standard_deviations() {
     assert!((120.0..400.0).contains(&sum), "{sum}");
 }
 
-/// What a fit takes up of the noise is missing in its residuals: of 8 views a sixth of the variance... deviations say it all the same.
+/// What a fit takes up of the noise is missing in its residuals, of 8 views a quarter of the variance: deviations say it all the same.
 #[test]
 fn noise_that_is_not_stated_is_not_taken_for_less_where_views_are_few() {
     let target = PoseNoise { xyz: 0.002, rot: 0.004 };
