@@ -33,7 +33,9 @@ fn cameras(page: &mut Page, subject: &Subject<'_>) {
         return;
     }
     let tiles = poses.iter().flat_map(|pose| {
-        let CameraPose { camera, on, sd, .. } = pose;
+        let CameraPose { camera, on, sd, assumed, .. } = pose;
+        // The summary says what is taken as given, and what of the pose hangs on that.
+        let on = if assumed.is_empty() { on.clone() } else { format!("{on} as given (see below)") };
         let [length, angle] = sd.map_or_else(<[String; 2]>::default, |sd| pose.sd_in_words(sd));
         [
             (format!("{} {length}", pose.centre_in_words()), format!("camera `{camera}`: x, y, z from {on}")),

@@ -54,6 +54,7 @@ fn the_pose_of_a_camera_stands_first_and_says_what_is_only_assumed_of_it() {
     let page = page_of(&known, &learned, &recording);
     let verdict = section(&page, "verdict");
     assert!(verdict.contains(&format!("<dd>{at} ± {:.3} mm</dd>", 1e3 * sd)), "{verdict}");
+    assert!(verdict.contains("x, y, z from the tip as given (see below)"), "{verdict}");
     assert!(verdict.find("<dd>") < verdict.find("<li>") && section(&page, "summary").contains("<code>fixed = ["));
     // Held as it says, the pose is known as well as it said, and nothing of it is assumed.
     known.estimate.fixed = pose.assumed.clone();
