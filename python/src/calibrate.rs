@@ -90,7 +90,7 @@ pub fn calibrate(
             return Err(unusable(format!("select_noise: it picks what noise to learn with, and not with {other}")));
         }
     }
-    let options = Options { seed, estimate_noise, influence };
+    let options = Options { seed, estimate_noise, influence, ..Options::default() };
     let (before, inner) = work::run(py, progress.as_ref(), threads, |observer| {
         if select_noise {
             let trials = library::select_noise(&before, &recording, &options, observer)?;

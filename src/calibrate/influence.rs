@@ -165,7 +165,7 @@ mod tests {
         let setup = Setup::new(rig, recording).unwrap();
         let priors = Priors::new(&setup);
         let mut observer = |_: &Progress<'_>| ControlFlow::Continue(());
-        let mut stages = Stages::new(&setup, &priors, &mut observer);
+        let mut stages = Stages::new(&setup, &priors, crate::calibrate::Options::default().iterations, &mut observer);
         let Fitted { mut state, freedom, verdict, loss, .. } = fit(&mut stages, None, 1).unwrap();
         let takes_part = |index: usize| verdict.active[index];
         let last = Stage { name: "last", freedom: &freedom, loss, takes_part: &takes_part };

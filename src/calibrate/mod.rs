@@ -99,11 +99,13 @@ pub struct Options {
     pub estimate_noise: bool,
     /// Whether the influence of every sample is computed: takes less than the calibration itself.
     pub influence: bool,
+    /// Most iterations of each fit; there are several.
+    pub iterations: usize,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { seed: 1, estimate_noise: false, influence: false }
+        Options { seed: 1, estimate_noise: false, influence: false, iterations: 200 }
     }
 }
 
@@ -197,7 +199,7 @@ fn attempt(
     observer: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Attempt, Error> {
     let priors = Priors::new(setup);
-    let mut stages = Stages::new(setup, &priors, observer);
+    let mut stages = Stages::new(setup, &priors, options.iterations, observer);
     let Fitted { state, freedom, gauge, verdict, loss, converged } = fit(&mut stages, start, options.seed)?;
     let takes_part = |index: usize| verdict.active[index];
     let last = Stage { name: LAST, freedom: &freedom, loss, takes_part: &takes_part };

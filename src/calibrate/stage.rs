@@ -19,16 +19,15 @@ pub(crate) struct Stage<'a> {
 pub(crate) struct Stages<'a> {
     pub setup: &'a Setup,
     pub priors: &'a Priors,
+    /// Most iterations of a stage.
+    pub iterations: usize,
     pub reports: Vec<StageReport>,
     pub observer: Observer<'a>,
 }
 
-/// Most iterations of a stage.
-const ITERATIONS: usize = 200;
-
 impl<'a> Stages<'a> {
-    pub fn new(setup: &'a Setup, priors: &'a Priors, observer: Observer<'a>) -> Self {
-        Stages { setup, priors, reports: Vec::new(), observer }
+    pub fn new(setup: &'a Setup, priors: &'a Priors, iterations: usize, observer: Observer<'a>) -> Self {
+        Stages { setup, priors, iterations, reports: Vec::new(), observer }
     }
 
     /// The graph of a stage at a state.
@@ -51,13 +50,13 @@ impl<'a> Stages<'a> {
         let pixels = 2.0 * self.setup.sd(Kind::Pixels) / coordinates.max(1.0).sqrt();
         let has_pixels = self.setup.has(Kind::Pixels);
         let mut solver = Solver::new(&built.graph);
-        let minimizer = LevenbergMarquardt { max_iterations: ITERATIONS, ..Default::default() };
-        let observer = &mut self.observer;
+        let minimizer = LevenbergMarquardt { max_iterations: self.iterations, ..Default::default() };
+        let (observer, of) = (&mut self.observer, self.iterations);
         let report = minimizer.minimize_with(&mut built.graph, &mut solver, &mut |iteration| {
             observer(&Progress {
                 stage: stage.name,
                 done: iteration.number,
-                of: ITERATIONS,
+                of,
                 rms_px: has_pixels.then(|| pixels * iteration.cost.sqrt()),
             })
         })?;

@@ -133,7 +133,8 @@ impl Calibrate {
         }
         self.length.iter().for_each(|length| rig.estimate.measure(length.clone()));
         rig.estimate.tag_side = self.tag_side.or(rig.estimate.tag_side);
-        let options = Options { seed: self.seed, estimate_noise: self.estimate_noise, influence: self.influence };
+        let (estimate_noise, influence) = (self.estimate_noise, self.influence);
+        let options = Options { seed: self.seed, estimate_noise, influence, ..Options::default() };
         let bar = Bar::new(is_json);
         let (trials, folds, calibration, suggestion, seconds) = on_threads(self.threads, || {
             let mut trials = Vec::new();

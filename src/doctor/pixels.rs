@@ -2,7 +2,7 @@
 use super::alternatives::{self, Alternative};
 use super::images::{self, Axes};
 use super::lag::Motion;
-use super::thin::{thin, thinned};
+use super::thin::{thin, thinned, with_fewer_features};
 use super::{About, Diagnosis, Finding, Misfit, Score, Watch, is_clearly_better};
 use crate::Error;
 use crate::calibrate::{self, Calibration, Errors, Finding as Unfit, calibrate, evaluate};
@@ -12,6 +12,9 @@ use std::ops::ControlFlow;
 
 /// An alternative fits in itself where its misfit is below this many times what noise leaves.
 const FITS: f64 = 5.0;
+
+/// Most iterations of each fit under an alternative: where it is right a few are enough, and where it is not they would go on creeping.
+const ITERATIONS: usize = 50;
 
 /// A lag is told from a shift by whole samples where its misfit is below this share of the shift's.
 const FINER: f64 = 0.8;
@@ -44,6 +47,7 @@ pub(super) fn examine(
         }
     };
     diagnosis.scores.push(Score { alternative: "as recorded".into(), misfit: as_recorded });
+    let options = &calibrate::Options { iterations: options.iterations.min(ITERATIONS), ..options.clone() };
 
     // What free intrinsics can hide shows where they are held.
     let held = images::held(rig, recording);
@@ -172,6 +176,7 @@ pub(super) fn learn(
     })
 }
 
+/// How well a rig that is learned under a hypothesis explains the recording, by some of its features.
 fn score(
     rig: &Rig,
     recording: &Recording,
@@ -179,7 +184,8 @@ fn score(
     hypothesis: &str,
     watch: &mut Watch<'_>,
 ) -> Option<Misfit> {
-    median(&learn(rig, recording, options, hypothesis, watch).ok()?.rig, recording)
+    let (rig, recording) = with_fewer_features(rig, recording);
+    median(&learn(&rig, &recording, options, hypothesis, watch).ok()?.rig, &recording)
 }
 
 /// How well a learned rig explains all of a recording.

@@ -201,13 +201,11 @@ impl Problem<'_> {
 mod tests {
     use super::*;
 
-    /// Success of single seeds over random arms: which share finds the axes.
     #[test]
     fn axes_of_random_arms_are_found_from_noisy_rotations() {
         for n in [4, 6, 7] {
             for (range, samples) in [(1.0, 30), (1.0, 50), (2.5, 50)] {
                 let mut found = 0;
-                let start = std::time::Instant::now();
                 for seed in 0..20 {
                     let mut rng = ChaCha8Rng::seed_from_u64(seed);
                     let mut normal = || Vector3::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
@@ -227,7 +225,7 @@ mod tests {
                     let axes = find_axes(&kinds, &joints, &rotations, 0.02, seed).expect("there are samples");
                     found += usize::from(axes.directions.iter().zip(&truth).all(|(a, b)| a.angle(b) < 0.1));
                 }
-                println!("{n} joints ±{range}, {samples}: {found}/20 in {:?}", start.elapsed() / 20);
+                assert!(found >= 19, "{n} joints within ±{range}, {samples} samples: {found} of 20");
             }
         }
     }

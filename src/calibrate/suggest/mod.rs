@@ -133,7 +133,7 @@ pub fn suggest(
     let setup = Setup::new(&Rig { noise, ..started }, &recording)?;
     let priors = Priors::new(&setup);
     let mut observer = |_: &super::Progress<'_>| ControlFlow::Continue(());
-    let mut stages = Stages::new(&setup, &priors, &mut observer);
+    let mut stages = Stages::new(&setup, &priors, super::Options::default().iterations, &mut observer);
     let start = known::start(&setup, learned)?;
     let Fitted { state, mut freedom, mut verdict, loss, .. } = fit(&mut stages, Some(start), options.seed)?;
     known::leave_out_unused(&setup, &mut freedom, &mut verdict, fit_of);
