@@ -308,6 +308,7 @@ def calibrate(
     tag_side: float | tuple[float, float] | None = None,
     lengths: Sequence[tuple[str, str, float] | tuple[str, str, float, float]] | None = None,
     eye_in_hand: bool = False,
+    hold: Sequence[str] | None = None,
     progress: Callable[[Progress], object] | None = None,
     threads: int | None = None,
 ) -> Calibration: ...

@@ -38,7 +38,7 @@ pub enum Length {
 /// tag_side: the side of all tags whose corners are features [m], or that and its standard deviation. lengths: distances that were
 /// measured between two features or two cameras, such as ``[("features.f0", "features.f7", 0.12)]`` [m], each with its standard deviation
 /// as a fourth where it is known; 0.5 mm where not. eye_in_hand: cameras that the rig does not list are on the hand, and what they see
-/// stands in the world.
+/// stands in the world. hold: parameters that stay at their values, such as ``["cameras.*.intrinsics"]``.
 /// influence: what leaving out each sample would change is computed too. seed: the same seed gives the same rig, byte for byte.
 /// progress: called with a ``Progress`` as the work goes on; what it raises ends the work, and so does Ctrl-C. threads: to work on, all
 /// cores where left out; the result does not depend on it.
@@ -49,7 +49,7 @@ pub enum Length {
 /// fit together.
 #[pyfunction]
 #[pyo3(signature = (recording, rig = None, *, relearn = None, estimate_noise = false, select_noise = false, influence = false, seed = 1,
-    tag_side = None, lengths = None, eye_in_hand = false, progress = None, threads = None))]
+    tag_side = None, lengths = None, eye_in_hand = false, hold = None, progress = None, threads = None))]
 #[expect(clippy::too_many_arguments, reason = "one keyword per option")]
 pub fn calibrate(
     py: Python<'_>,
@@ -63,6 +63,7 @@ pub fn calibrate(
     tag_side: Option<TagSide>,
     lengths: Option<Vec<Length>>,
     eye_in_hand: bool,
+    hold: Option<Vec<String>>,
     progress: Option<Py<PyAny>>,
     threads: Option<usize>,
 ) -> PyResult<Calibration> {
@@ -70,6 +71,9 @@ pub fn calibrate(
     let (recording, notes) = (recording.inner.clone(), recording.notes.clone());
     if eye_in_hand && !library::put_on_tip(&mut before, &recording) {
         return Err(unusable("eye_in_hand: the rig lists every camera with its parent".to_owned()));
+    }
+    for pattern in hold.iter().flatten() {
+        library::hold(&mut before, &recording, pattern).map_err(|problem| unusable(format!("hold: {problem}")))?;
     }
     let tag_side = tag_side.map(|side| match side {
         TagSide::Alone(side) => [side, rig::Length::RULER],
@@ -84,6 +88,9 @@ pub fn calibrate(
         let between =
             rig::Ends::new([&one, &other]).map_err(|problem| PyValueError::new_err(format!("lengths: {problem}")))?;
         before.estimate.measure(rig::Length { between, length, sd });
+    }
+    if relearn.is_some() && hold.as_ref().is_some_and(|hold| !hold.is_empty()) {
+        return Err(unusable("hold: what is not learned anew with relearn is held already".to_owned()));
     }
     for (other, is_given) in [("relearn", relearn.is_some()), ("estimate_noise", estimate_noise)] {
         if select_noise && is_given {

@@ -166,6 +166,18 @@ def test_cameras_that_no_rig_lists_are_put_on_the_hand(ur5, motions):
         handeye.calibrate(motions, ur5, eye_in_hand=True)
 
 
+def test_what_is_known_is_held(motions):
+    held = handeye.calibrate(motions, "ur5_arm", hold=["cameras.*.intrinsics", "robot.joints.elbow.d"])
+    free = handeye.calibrate(motions, "ur5_arm")
+    for path in ("cameras.left.fx", "robot.joints.elbow.d"):
+        assert path not in held.deviations and free.deviations[path] > 0
+    assert held.rig["robot.joints.elbow.d"] == handeye.Rig.load("ur5_arm")["robot.joints.elbow.d"]
+    with pytest.raises(handeye.UnusableInput, match="hold: .*`cameras.lefd` matches nothing"):
+        handeye.calibrate(motions, "ur5_arm", hold=["cameras.lefd"])
+    with pytest.raises(handeye.UnusableInput, match="hold: what is not learned anew"):
+        handeye.calibrate(motions, held.rig, hold=["cameras.left.fx"], relearn=["cameras.left"])
+
+
 def test_wrong_samples_are_named(ur5, motions):
     pixels = motions.pixels
     for camera in pixels:

@@ -129,8 +129,9 @@ impl std::fmt::Display for CameraPose {
         write!(
             f,
             ". This takes {} as given, since no image shows {them}; as uncertain as {they_are} assumed to be, the pose is known to {length} and \
-             {angle}. Where {they_are} as in the data sheet, hold {them}: `fixed = [{}]` under `[estimate]`",
+             {angle}. Where {they_are} as in the data sheet, hold {them}: `--hold {}`, or `fixed = [{}]` under `[estimate]` of a rig file",
             assumed.join(", "),
+            assumed.join(","),
             quoted.join(", ")
         )
     }

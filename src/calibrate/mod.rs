@@ -72,7 +72,7 @@ pub use report::{Calibration, Distance, Finding, Report, StageReport, TipDeviati
 pub use selection::{NoiseTrial, select_noise};
 pub use suggest::{SuggestOptions, SuggestedSample, Suggestion, suggest};
 pub use targets::{Disagreement, TargetReport};
-pub use unlisted::put_on_tip;
+pub use unlisted::{hold, put_on_tip};
 pub(crate) use unlisted::{list_cameras, list_features};
 pub(crate) use weak::in_words as combinations_in_words;
 pub use weak::{Combination, DeterminedBy};

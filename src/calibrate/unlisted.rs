@@ -1,6 +1,7 @@
 //! Cameras and features that a recording has and the rig does not list.
+use crate::Error;
 use crate::recording::{Recording, Sample};
-use crate::rig::{Camera, Feature, Parent, Rig};
+use crate::rig::{Camera, Feature, Parent, Rig, problem_of_fixed};
 
 /// Lists on the tip the cameras that only the recording has: a camera on the hand, of which no rig file says so. False where the rig lists all.
 pub fn put_on_tip(rig: &mut Rig, recording: &Recording) -> bool {
@@ -8,6 +9,22 @@ pub fn put_on_tip(rig: &mut Rig, recording: &Recording) -> bool {
     list_cameras(rig, recording);
     rig.cameras[listed..].iter_mut().for_each(|camera| camera.parent = Parent::Tip);
     rig.cameras.len() > listed
+}
+
+/// Holds the parameters that a pattern covers at their values; of cameras and features that only the recording has too.
+///
+/// Errors: [`Error::Unusable`] where it covers nothing, or something that has no value.
+pub fn hold(rig: &mut Rig, recording: &Recording, pattern: &str) -> Result<(), Error> {
+    let mut listed = rig.clone();
+    list_cameras(&mut listed, recording);
+    list_features(&mut listed, recording);
+    match problem_of_fixed(pattern, &listed) {
+        Some(problem) => Err(Error::Unusable(problem)),
+        None => {
+            rig.estimate.fixed.push(pattern.to_owned());
+            Ok(())
+        }
+    }
 }
 
 /// Lists the cameras that only the recording has, in the world.

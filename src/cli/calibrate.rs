@@ -13,8 +13,8 @@ use clap::Args;
 use handeye::Error;
 use handeye::calibrate::{
     Calibration, CameraPose, Distance, Errors, Finding, NoiseTrial, Options, OverstatedNoise, Progress, Report,
-    TargetReport, assumptions, calibrate, camera_poses, camera_poses_in_words, findings_in_words, overstated_noise,
-    relearn, select_noise,
+    TargetReport, assumptions, calibrate, camera_poses, camera_poses_in_words, findings_in_words, hold,
+    overstated_noise, relearn, select_noise,
 };
 use handeye::recording::Recording;
 use handeye::report;
@@ -36,6 +36,7 @@ Examples:
   handeye calibrate motions.jsonl -o learned.toml --report page.html    a page to read
   handeye calibrate robot.mcap --rig ur5e --tag-side 0.06 -o arm.toml   tags that tell how large everything is
   handeye calibrate robot.mcap --rig panda --eye-in-hand -o arm.toml    a camera on the wrist, features in the world
+  handeye calibrate robot.mcap --hold 'cameras.*.intrinsics' -o arm.toml   lenses stay as they were calibrated
   handeye calibrate three.jsonl --rig arm.toml --relearn cameras.left -o arm.toml   a camera that was moved
   handeye calibrate five.jsonl --rig arm.toml --relearn cameras.top -o arm.toml     a camera that is new
   handeye calibrate two.jsonl --rig arm.toml --relearn 'features.tool*' -o arm.toml another object in the gripper")]
@@ -69,6 +70,9 @@ pub struct Calibrate {
     /// given more than once
     #[arg(long, value_name = "A,B=METRES[,SD]", value_parser = read_length)]
     length: Vec<Length>,
+    /// Hold these at their values, as [estimate] fixed of a rig file does: cameras.*.intrinsics, robot.joints.j6.d; may be given more than once
+    #[arg(long, value_name = "PATH", value_delimiter = ',', conflicts_with = "relearn")]
+    hold: Vec<String>,
     /// The side of all tags whose corners are features, and its standard deviation [m] [default: 0.0005]
     #[arg(long, value_name = "METRES[,SD]", value_parser = metres)]
     tag_side: Option<[f64; 2]>,
@@ -130,6 +134,9 @@ impl Calibrate {
         let places_cameras = !rig.cameras.is_empty() || self.eye_in_hand;
         if self.eye_in_hand {
             eye_in_hand(&mut rig, &recording)?;
+        }
+        for pattern in &self.hold {
+            hold(&mut rig, &recording, pattern).map_err(|error| Error::Unusable(format!("--hold {error}")))?;
         }
         self.length.iter().for_each(|length| rig.estimate.measure(length.clone()));
         rig.estimate.tag_side = self.tag_side.or(rig.estimate.tag_side);
@@ -244,7 +251,10 @@ fn describe(before: &Rig, recording: &Recording, calibration: &Calibration, seco
         text += &format!("\nthe tip's position is known to {tip}\n");
         let assumed = if tip.hangs_on_priors() { assumptions(before, recording) } else { Vec::new() };
         if !assumed.is_empty() {
-            text += &format!("  what was assumed: {}\n", assumed.join(", "));
+            text += &format!(
+                "  what was assumed: {}; what is known better is held (`--hold 'cameras.*.intrinsics'`) or told (`[estimate.prior]` of a rig file)\n",
+                assumed.join(", ")
+            );
         }
     }
     for (title, lines) in [

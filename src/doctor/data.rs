@@ -24,8 +24,7 @@ const FAR: f64 = 20.0;
 pub(super) fn findings(rig: &Rig, recording: &Recording, tips: &[Option<Pose>]) -> Vec<Finding> {
     let mut findings = outside_limits(rig, recording);
     findings.extend(repeats(recording));
-    findings.extend(one_joint(recording));
-    findings.extend(one_axis(tips));
+    findings.extend(one_joint(recording).or_else(|| one_axis(tips)));
     findings.extend(distances(rig, recording));
     findings
 }
@@ -99,7 +98,7 @@ fn one_joint(recording: &Recording) -> Option<Finding> {
         [joint] => format!("only joint {joint} moves"),
         _ => return None,
     };
-    Some(Finding { about: About::Order, what, change: "record positions in which all joints differ".into() })
+    Some(Finding { about: About::Turns, what, change: "record positions in which all joints differ".into() })
 }
 
 /// All rotations about one axis leave the positions along it open.

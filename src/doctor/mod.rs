@@ -61,7 +61,7 @@ pub enum About {
     Units,
     /// Readings beyond the rig's limits.
     Limits,
-    /// Turns of the tip that are too few, or all about one axis.
+    /// Joints that move too little, and turns of the tip that are all about one axis.
     Turns,
     /// How rows go with images and with one another, and how poses, pixels and cameras are written.
     Order,

@@ -9,7 +9,7 @@ pub(crate) fn problem_of_name(name: &str) -> Option<String> {
     }
     let wrong = name.chars().find(|&c| c == '.' || c == '*' || c.is_control())?;
     Some(format!(
-        "the name {name:?} has a {wrong:?}, which parameter paths cannot hold (letters, digits, `-`, `_` would do)"
+        "the name {name:?} has a {wrong:?}, which parameter paths cannot hold: anything but `.`, `*` and line breaks would do"
     ))
 }
 

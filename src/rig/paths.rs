@@ -218,9 +218,18 @@ impl Rig {
     }
 }
 
-/// True where a pattern covers a path: `*` stands for any characters of one component, and a shorter pattern covers all below
-/// it.
+/// In patterns, all numbers of a camera but its pose.
+pub(crate) const INTRINSICS: &str = "intrinsics";
+
+/// True where a pattern covers a path: `*` stands for any characters of one component, a shorter pattern covers all below
+/// it, and `cameras.NAME.intrinsics` covers focal lengths, image centre and distortion.
 pub fn matches(pattern: &str, path: &str) -> bool {
+    if let Some(camera) = pattern.strip_suffix(INTRINSICS)
+        && camera.starts_with("cameras.")
+        && camera.matches('.').count() == 2
+    {
+        return CameraField::ALL.iter().any(|field| matches(&format!("{camera}{}", field.name()), path));
+    }
     let mut components = path.split('.');
     pattern.split('.').all(|wanted| components.next().is_some_and(|found| covers(wanted, found)))
 }
@@ -288,6 +297,12 @@ mod tests {
             ("features.*-*-corner", "features.tag-corner.xyz", false),
             ("feature*.tool", "features.tool.xyz", true),
             ("*.tool*", "robot.joints.tool.a", false),
+            ("cameras.*.intrinsics", "cameras.left.fx", true),
+            ("cameras.left.intrinsics", "cameras.left.distortion", true),
+            ("cameras.left.intrinsics", "cameras.right.fx", false),
+            ("cameras.*.intrinsics", "cameras.left.pose", false),
+            ("cameras.intrinsics", "cameras.intrinsics.pose", true),
+            ("features.f.intrinsics", "features.f.xyz", false),
         ] {
             assert_eq!(matches(pattern, path), expected, "{pattern} {path}");
         }

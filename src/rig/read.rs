@@ -13,6 +13,7 @@ mod views;
 use super::Rig;
 use crate::Error;
 use document::{Node, Source};
+pub(crate) use estimate::problem_of_fixed;
 pub use files::files_named;
 use std::path::Path;
 pub(crate) use views::problem_of_distortion;

@@ -73,6 +73,33 @@ fn a_camera_on_the_hand_needs_one_word() {
     assert!(err.contains("--eye-in-hand has no effect"), "{err}");
 }
 
+/// Lenses that a recording gives, and a row of the arm, stay to the bit; the rest is learned as well.
+#[test]
+fn what_is_known_exactly_is_held_without_a_rig_file() {
+    let folder = motions("hold");
+    let known = catalog::rig("ur5").unwrap();
+    Rig { cameras: Vec::new(), features: Vec::new(), ..known.clone() }
+        .write(&folder.path().join("arm.toml"), None)
+        .unwrap();
+    let held = "--hold cameras.*.intrinsics,robot.joints.shoulder_pan --hold robot.joints.elbow.d";
+    let report = json(&folder, &format!("calibrate motions.jsonl --rig arm.toml {held} -o learned.toml"));
+    assert!(report["rms_px"].as_f64().unwrap() < 1.1 * FLOOR, "{} px", report["rms_px"]);
+    let learned = Rig::parse(&folder.read("learned.toml"), "learned.toml").unwrap();
+    for camera in &learned.cameras {
+        let before = known.cameras.iter().find(|known| known.name == camera.name).unwrap();
+        assert_eq!((camera.fx, camera.fy, camera.cx, camera.cy), (before.fx, before.fy, before.cx, before.cy));
+    }
+    let [free, before] = [&learned, &known].map(|rig| &rig.robot.joints);
+    assert_eq!((&free[0], free[2].d), (&before[0], before[2].d));
+    assert_ne!(free[2].a, before[2].a);
+
+    let error = |args: &str| folder.expect(2, &format!("calibrate motions.jsonl --rig arm.toml {args} -o x.toml")).1;
+    let unknown = error("--hold cameras.lefd.fx");
+    assert!(unknown.contains("--hold `cameras.lefd.fx` matches nothing") && unknown.contains("`left`"), "{unknown}");
+    let open = error("--hold features");
+    assert!(open.contains("--hold `features` holds `features.") && open.contains("which has no value"), "{open}");
+}
+
 #[test]
 fn one_thread_and_two_write_the_same_bytes() {
     let folder = motions("threads");

@@ -2,7 +2,7 @@
 use super::document::{Field, Fields, Node};
 use crate::Error;
 use crate::error::suggestion;
-use crate::rig::paths::{CameraField, JointField, covers, matches};
+use crate::rig::paths::{CameraField, INTRINSICS, JointField, covers, matches};
 use crate::rig::{Ends, Estimate, Length, Parameter, Rig};
 use std::collections::BTreeMap;
 
@@ -68,20 +68,24 @@ fn read_ends(node: &Node, rig: &Rig) -> Result<Ends, Error> {
 
 fn read_fixed(node: &Node, rig: &Rig) -> Result<String, Error> {
     let pattern = node.text()?;
+    match problem_of_fixed(pattern, rig) {
+        Some(problem) => Err(node.error(problem)),
+        None => Ok(pattern.to_owned()),
+    }
+}
+
+/// Why a pattern holds nothing, or something that has no value.
+pub(crate) fn problem_of_fixed(pattern: &str, rig: &Rig) -> Option<String> {
     if let Some(problem) = problem_of_pattern(pattern, rig) {
-        return Err(node.error(problem));
+        return Some(problem);
     }
     let lacking = |parameter: &Parameter| {
         // A base that is left out is the identity, and intrinsics may come from the recording.
         !matches!(parameter, Parameter::Base | Parameter::CameraField { .. }) && !rig.has_value(parameter)
     };
     let mut parameters = rig.parameters().into_iter().filter(lacking).map(|parameter| parameter.path(rig));
-    match parameters.find(|path| matches(pattern, path)) {
-        Some(path) => {
-            Err(node.error(format!("`{pattern}` holds `{path}`, which has no value (give one, or do not hold it)")))
-        }
-        None => Ok(pattern.to_owned()),
-    }
+    let path = parameters.find(|path| matches(pattern, path))?;
+    Some(format!("`{pattern}` holds `{path}`, which has no value (give one, or do not hold it)"))
 }
 
 /// A table by parameter path. Quoted paths are one key; paths without quotes are tables within tables.
@@ -116,7 +120,7 @@ pub(super) fn problem_of_pattern(pattern: &str, rig: &Rig) -> Option<String> {
     let targets: Vec<&str> = rig.targets.iter().map(|target| target.name.as_str()).collect();
     let joint_fields: Vec<&str> = JointField::ALL.iter().map(|field| field.name()).collect();
     let camera_fields: Vec<&str> =
-        std::iter::once("pose").chain(CameraField::ALL.iter().map(|field| field.name())).collect();
+        ["pose", INTRINSICS].into_iter().chain(CameraField::ALL.iter().map(|field| field.name())).collect();
     // What may stand at each place of a path, for each kind of parameter; an empty list is any name.
     let grammar: [&[&[&str]]; 5] = [
         &[&["robot"], &["base"]],
