@@ -1,4 +1,5 @@
 //! Predicts the detections of a recording and compares.
+use super::lag;
 use super::misfit::misfits;
 use super::observation::Kind;
 use super::placed::Placed;
@@ -150,6 +151,8 @@ pub fn evaluate(rig: &Rig, recording: &Recording) -> Result<Evaluation, Error> {
     evaluation.fitting = Fitting::new(rig, &model, recording, &samples);
     evaluation.reading_noise = ReadingNoise::new(rig, &model, recording);
     evaluation.misfits = misfits(&rig.noise, &evaluation.fitting.total, &evaluation.reading_noise.0);
+    let found = [&evaluation.fitting.findings[..], &evaluation.misfits].concat();
+    evaluation.fitting.findings.splice(..0, lag::behind(&found, rig, recording));
     Ok(evaluation)
 }
 

@@ -77,12 +77,8 @@ fn range(all: &[&Finding]) -> String {
         Finding::WrongJoints { off, .. } | Finding::WrongImage { off, .. } => Some(*off),
         _ => None,
     };
-    let size = |distance: &Distance| match distance {
-        Distance::Pixels(px) => *px,
-        Distance::Metres(m) => *m,
-    };
     let mut offs: Vec<Distance> = all.iter().filter_map(off).collect();
-    offs.sort_by(|one, other| size(one).total_cmp(&size(other)));
+    offs.sort_by(|one, other| one.size().total_cmp(&other.size()));
     let ends = offs.first().zip(offs.last());
     ends.map_or_else(String::new, |(least, most)| format!(" ({least:.1} to {most:.1})"))
 }

@@ -16,6 +16,7 @@ mod initialise;
 mod join;
 mod kinematics;
 mod known;
+mod lag;
 mod lengths;
 mod leverage;
 mod look;
@@ -59,6 +60,7 @@ pub(crate) use evaluate::{Correspondence, median};
 pub use findings::findings_in_words;
 pub use fitting::Fitting;
 pub use influence::{Influence, most_influential, worst_fitting};
+pub(crate) use lag::{Motion, SAME as SAME_LAG, in_words as lag_in_words, interpolated};
 pub(crate) use misfit::over_noise;
 pub(crate) use observation::Kind;
 pub(crate) use outliers::{is_wrong, yardstick};
@@ -159,6 +161,8 @@ pub fn calibrate(
             let mut learned = finish(&setup, &state, verdict, reports, converged && settled, gauge, deviations);
             learned.report.noise = options.estimate_noise.then_some(setup.rig.noise);
             learned.report.influence = influence;
+            let lag = lag::behind(&learned.report.findings, &learned.rig, recording);
+            learned.report.findings.splice(..0, lag);
             return Ok(learned);
         }
         setup.rig.noise = attempt.noise.unwrap_or(setup.rig.noise);

@@ -1,4 +1,5 @@
 //! What a calibration did and found, and how good it is.
+use super::lag::in_words as lag_in_words;
 use super::{CameraErrors, Combination, Influence, PointErrors, TargetReport};
 use crate::rig::{Length, Noise, Rig};
 
@@ -88,6 +89,13 @@ pub enum Finding {
         /// Stated standard deviation of a coordinate.
         stated: Distance,
     },
+    /// Joints are stamped late, or early: without that, the samples in which the robot is fastest fit far better.
+    Lag {
+        /// By how much they are late [s].
+        seconds: f64,
+        /// Median distance of those samples as recorded, and without the lag.
+        misfits: [Distance; 2],
+    },
     /// A measured length that the learned rig misses by more than three of its standard deviations.
     MissedLength {
         /// What was measured.
@@ -154,6 +162,15 @@ impl Finding {
                  wrong, or the fit went astray",
                 stated.rounded()
             ),
+            Finding::Lag { seconds, misfits: [with, without] } => {
+                let [what, change] = lag_in_words(*seconds);
+                format!(
+                    "{what}: where the robot is fastest, {} in the median become {} without that, and nothing else that does not fit is to be \
+                     believed before; {change}; or take what stands still alone (`--still`)",
+                    with.rounded(),
+                    without.rounded()
+                )
+            }
             Finding::MissedLength { length, learned } => format!(
                 "{} was measured as {:.2} mm and is {:.2} mm in the learned rig: one of it and the other known lengths is wrong",
                 length.between,
@@ -198,7 +215,10 @@ impl std::fmt::Display for Finding {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let words = self.of_evaluation();
         match self {
-            Finding::Misfit { .. } | Finding::MissedLength { .. } | Finding::FarFromGiven { .. } => f.write_str(&words),
+            Finding::Misfit { .. }
+            | Finding::Lag { .. }
+            | Finding::MissedLength { .. }
+            | Finding::FarFromGiven { .. } => f.write_str(&words),
             Finding::UnseenCamera { .. } | Finding::Outliers { .. } => {
                 let verb = if matches!(self, Finding::UnseenCamera { .. }) { "was" } else { "were" };
                 write!(f, "{words} and {verb} left out")
@@ -229,6 +249,13 @@ pub enum Distance {
 }
 
 impl Distance {
+    /// Without its unit [px or m]: comparable among distances of one kind.
+    pub(crate) fn size(self) -> f64 {
+        match self {
+            Distance::Pixels(size) | Distance::Metres(size) => size,
+        }
+    }
+
     fn with_unit(&self) -> (f64, &'static str) {
         match self {
             Distance::Pixels(px) => (*px, "px"),

@@ -380,6 +380,10 @@ pub fn finding_json(finding: &Finding, words: String) -> Value {
     let mut json = match finding {
         Finding::UnseenCamera { camera } => json!({ "kind": "unseen_camera", "camera": camera }),
         Finding::Misfit { ratio, stated } => with(json!({ "kind": "misfit", "ratio": ratio }), "stated", stated),
+        Finding::Lag { seconds, misfits: [with_it, without] } => {
+            let lag = with(json!({ "kind": "lag", "joints_late_s": seconds }), "fastest", with_it);
+            with(lag, "fastest_without", without)
+        }
         Finding::FarFromGiven { values } => {
             let value = |(path, [given, learned], sds): &(String, [f64; 2], f64)| json!({ "path": path, "given": given, "learned": learned, "deviations": sds });
             json!({ "kind": "far_from_given", "values": values.iter().map(value).collect::<Vec<_>>() })

@@ -70,7 +70,8 @@ pub fn json(rig: &Rig, evaluation: &Evaluation) -> Value {
     object.insert("in_space".to_owned(), space_json(evaluation.space));
     object.insert("learned_from_it".to_owned(), json!(evaluation.is_own));
     let (of_readings, _) = &evaluation.reading_noise;
-    object.insert("reading_noise".to_owned(), json!({ "rms_px": of_readings.px, "rms_mm": 1e3 * of_readings.m }));
+    let in_mm = (evaluation.total.points.observations > 0).then_some(1e3 * of_readings.m);
+    object.insert("reading_noise".to_owned(), json!({ "rms_px": of_readings.px, "rms_mm": in_mm }));
     let poor = evaluation.fitting.poor.iter().map(|(sample, off)| with(json!({ "sample": sample }), "median", off));
     object.insert("fit_worst".to_owned(), poor.collect());
     let mut fitting = errors_json(&evaluation.fitting.total);

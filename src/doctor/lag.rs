@@ -1,23 +1,10 @@
-//! A lag between the clocks of robot and images, where samples are dense enough to interpolate joints between them.
-//!
-//! What stands still looks the same at any lag, and may be most of a recording. So a lag is judged by the samples in which the robot is fastest.
-use super::pixels::{learn, misfit};
+//! A lag between the clocks of robot and images, found in turns with the rig under it.
+use super::pixels::learn;
 use super::thin::thinned;
-use super::{Misfit, Watch, is_clearly_better};
-use crate::calibrate::{Options, evaluate};
-use crate::recording::{Recording, Sample};
+use super::{Misfit, Watch};
+use crate::calibrate::{Motion, Options, SAME_LAG, interpolated};
+use crate::recording::Recording;
 use crate::rig::Rig;
-
-/// Samples are dense where the median step of a joint is below this share of its range.
-const DENSE: f64 = 0.15;
-
-/// Lags are tried up to so many sample periods, in steps of so much of one; around the best of them in finer ones.
-const PERIODS: f64 = 5.0;
-const STEP: f64 = 0.1;
-const FINER_STEP: f64 = 0.01;
-
-/// A lag is judged by this share of the samples: those in which the robot is fastest.
-const FASTEST: f64 = 1.0 / 3.0;
 
 /// Turns of learning a rig and finding the lag under it.
 const ROUNDS: usize = 6;
@@ -32,124 +19,28 @@ pub(super) struct Lag {
     pub misfits: [Option<Misfit>; 2],
 }
 
-/// A recording that is dense in time.
-pub(super) struct Motion<'a> {
-    recording: &'a Recording,
-    /// Median time between samples [s].
-    period: f64,
-    /// Some of the samples in which the robot is fastest.
-    fastest: Recording,
-}
-
-impl<'a> Motion<'a> {
-    /// `None` where samples are not dense in time.
-    pub(super) fn new(recording: &'a Recording) -> Option<Self> {
-        let period = period(recording)?;
-        let fastest = thinned(&fastest(recording)?);
-        Some(Motion { recording, period, fastest })
-    }
-
-    /// True where some lag explains the fastest samples clearly better, under a rig that was learned from what was recorded.
-    pub(super) fn shows_lag(&self, learned: &Rig) -> bool {
-        let best = self.best_lag(learned).and_then(|lag| self.misfit(learned, lag));
-        is_clearly_better(best, self.misfit(learned, 0.0))
-    }
-
-    /// The lag at which a rig explains the fastest samples best, found in turns with the rig; `learned`: that of the data as recorded. `None` where
-    /// there is none, or nothing can be learned.
-    pub(super) fn lag(&self, rig: &Rig, learned: &Rig, options: &Options, watch: &mut Watch<'_>) -> Option<Lag> {
-        let some = thinned(self.recording);
-        let mut without = learned.clone();
-        let mut seconds = 0.0;
-        for _ in 0..ROUNDS {
-            let best = self.best_lag(&without)?;
-            let is_settled = (best - seconds).abs() < 1.5 * FINER_STEP * self.period;
-            if is_settled {
-                break;
-            }
-            seconds = best;
-            without = learn(rig, &interpolated(self.recording, &some, seconds), options, "a lag", watch).ok()?.rig;
+/// The lag at which a rig explains the fastest samples best, found in turns with the rig; `learned`: that of the data as recorded. `None` where
+/// there is none, or nothing can be learned.
+pub(super) fn lag(
+    motion: &Motion<'_>,
+    rig: &Rig,
+    learned: &Rig,
+    options: &Options,
+    watch: &mut Watch<'_>,
+) -> Option<Lag> {
+    let some = thinned(motion.recording);
+    let mut without = learned.clone();
+    let mut seconds = 0.0;
+    for _ in 0..ROUNDS {
+        let best = motion.best_lag(&without)?;
+        let is_settled = (best - seconds).abs() < SAME_LAG * motion.period;
+        if is_settled {
+            break;
         }
-        let misfits = [self.misfit(learned, 0.0), self.misfit(&without, seconds)];
-        (seconds != 0.0).then(|| Lag { seconds, recording: interpolated(self.recording, &some, seconds), misfits })
+        seconds = best;
+        without = learn(rig, &interpolated(motion.recording, &some, seconds), options, "a lag", watch).ok()?.rig;
     }
-
-    /// Of the fastest samples, with joints that were stamped `lag` [s] later.
-    fn misfit(&self, rig: &Rig, lag: f64) -> Option<Misfit> {
-        let misfit = misfit(&evaluate(rig, &interpolated(self.recording, &self.fastest, lag)).ok()?.total);
-        misfit.size().is_finite().then_some(misfit)
-    }
-
-    /// Of several that are as good the smallest.
-    fn best_lag(&self, rig: &Rig) -> Option<f64> {
-        let best_of = |around: f64, step: f64, n_steps: i32| {
-            let lags = (-n_steps..=n_steps).map(|k| around + f64::from(k) * step * self.period);
-            let sizes = lags.map(|lag| (self.misfit(rig, lag).map_or(f64::INFINITY, |misfit| misfit.size()), lag));
-            sizes.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.abs().total_cmp(&b.1.abs()))).map(|(_, lag)| lag)
-        };
-        let coarse = best_of(0.0, STEP, (PERIODS / STEP).round() as i32)?;
-        best_of(coarse, FINER_STEP, (STEP / FINER_STEP).round() as i32)
-    }
-}
-
-/// Times [s] and joints of the samples that have both.
-fn rows(recording: &Recording) -> Vec<(f64, &Vec<f64>)> {
-    recording.samples.iter().filter_map(|sample| Some((sample.time?, sample.joints.as_ref()?))).collect()
-}
-
-/// Median time between samples [s], where joints change little over it.
-fn period(recording: &Recording) -> Option<f64> {
-    let rows = rows(recording);
-    if rows.len() < 10 || rows.len() < recording.samples.len() / 2 {
-        return None;
-    }
-    let median = |mut values: Vec<f64>| crate::calibrate::median(&mut values);
-    let dense = |joint: usize| {
-        let readings = || rows.iter().map(|(_, joints)| joints[joint]);
-        let range = readings().fold(f64::NEG_INFINITY, f64::max) - readings().fold(f64::INFINITY, f64::min);
-        let steps = rows.windows(2).map(|pair| (pair[1].1[joint] - pair[0].1[joint]).abs()).collect();
-        median(steps) <= DENSE * range
-    };
-    let period = median(rows.windows(2).map(|pair| pair[1].0 - pair[0].0).collect());
-    (period > 0.0 && (0..recording.joints.len()).all(dense)).then_some(period)
-}
-
-/// The samples in which joints go fastest, from the sample before to the one after.
-fn fastest(recording: &Recording) -> Option<Recording> {
-    let samples = &recording.samples;
-    let speed = |index: usize| -> Option<f64> {
-        let [before, after] = [samples.get(index.checked_sub(1)?)?, samples.get(index + 1)?];
-        let (from, to) = (before.joints.as_ref()?, after.joints.as_ref()?);
-        let way: f64 = from.iter().zip(to).map(|(from, to)| (to - from).powi(2)).sum();
-        let seconds = after.time? - before.time?;
-        (seconds > 0.0).then(|| way.sqrt() / seconds)
-    };
-    let mut by_speed: Vec<(f64, usize)> =
-        (0..samples.len()).filter_map(|index| Some((speed(index)?, index))).filter(|(speed, _)| *speed > 0.0).collect();
-    by_speed.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    by_speed.truncate((FASTEST * by_speed.len() as f64).ceil() as usize);
-    let mut kept: Vec<usize> = by_speed.into_iter().map(|(_, index)| index).collect();
-    kept.sort_unstable();
-    (!kept.is_empty()).then(|| recording.select(|index| kept.binary_search(&index).is_ok()))
-}
-
-/// `some` of the recording's samples with the joints that were stamped `lag` [s] later than each image, linear between all stamps; samples without
-/// such are left out.
-fn interpolated(recording: &Recording, some: &Recording, lag: f64) -> Recording {
-    let rows = rows(recording);
-    let at = |time: f64| -> Option<Vec<f64>> {
-        let after = rows.partition_point(|(stamp, _)| *stamp < time);
-        let (next, joints) = rows.get(after)?;
-        if *next == time {
-            return Some((*joints).clone());
-        }
-        let (before, from) = rows.get(after.checked_sub(1)?)?;
-        let share = (time - before) / (next - before);
-        Some(from.iter().zip(*joints).map(|(a, b)| a + share * (b - a)).collect())
-    };
-    let samples = some.samples.iter().filter_map(|sample| {
-        let joints = at(sample.time? + lag)?;
-        Some(Sample { joints: Some(joints), ..sample.clone() })
-    });
-    Recording { samples: samples.collect(), ..some.clone() }
+    let misfit = |rig: &Rig, lag: f64| motion.misfit(rig, lag).map(Misfit::from);
+    let misfits = [misfit(learned, 0.0), misfit(&without, seconds)];
+    (seconds != 0.0).then(|| Lag { seconds, recording: interpolated(motion.recording, &some, seconds), misfits })
 }

@@ -10,7 +10,7 @@ mod undo;
 
 pub(crate) use data::repeats;
 
-use crate::calibrate;
+use crate::calibrate::{self, Distance};
 use crate::chain::JointKind;
 use crate::recording::Recording;
 use crate::rig::{Model, Noise, Rig};
@@ -43,6 +43,15 @@ pub enum Misfit {
         /// Distance [m].
         shift: f64,
     },
+}
+
+impl From<Distance> for Misfit {
+    fn from(distance: Distance) -> Self {
+        match distance {
+            Distance::Pixels(px) => Misfit::Pixels(px),
+            Distance::Metres(m) => Misfit::Points(m),
+        }
+    }
 }
 
 /// One hypothesis of how the data came about and how well it explains them.

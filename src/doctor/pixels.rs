@@ -1,11 +1,11 @@
 //! Which reading of joints or tip poses explains the pixels and points: a calibration per alternative.
 use super::alternatives::{self, Alternative};
 use super::images::{self, Axes};
-use super::lag::Motion;
+use super::lag::lag;
 use super::thin::{thin, thinned, with_fewer_features};
 use super::{About, Diagnosis, Finding, Misfit, Score, Watch, is_clearly_better};
 use crate::Error;
-use crate::calibrate::{self, Calibration, Errors, Finding as Unfit, calibrate, evaluate};
+use crate::calibrate::{self, Calibration, Errors, Finding as Unfit, Motion, calibrate, evaluate, lag_in_words};
 use crate::recording::Recording;
 use crate::rig::{Noise, Rig};
 use std::ops::ControlFlow;
@@ -88,7 +88,7 @@ pub(super) fn examine(
     let motion = Motion::new(whole).zip(learned.as_ref()).filter(|(motion, learned)| {
         !is_fine(&best) && (!as_recorded.as_ref().is_some_and(explains) || motion.shows_lag(learned))
     });
-    if let Some(lag) = motion.and_then(|(motion, learned)| motion.lag(rig, learned, options, watch)) {
+    if let Some(lag) = motion.and_then(|(motion, learned)| lag(&motion, rig, learned, options, watch)) {
         let misfit = score(rig, &lag.recording, options, "a lag", watch);
         let Finding { what, .. } = of_lag(lag.seconds);
         diagnosis.scores.push(Score { alternative: what.clone(), misfit });
@@ -147,15 +147,8 @@ fn swapped(unfit: &Unfit, kept: &[usize]) -> Option<Finding> {
 
 /// `seconds`: by how much joints are stamped late.
 fn of_lag(seconds: f64) -> Finding {
-    let by = seconds.abs();
-    let (side, to) = if seconds > 0.0 { ("late", "subtract") } else { ("early", "add") };
-    let stamps = if seconds > 0.0 { "from the stamps" } else { "to the stamps" };
-    // A sum with zero is never negative zero.
-    let delay = format!("--joint-delay {:.3}", 0.0 - seconds);
-    finding(
-        &format!("joints are stamped {by:.3} s too {side}"),
-        &format!("{to} {by:.3} s {stamps} of the joints; a bag is read so with {delay}"),
-    )
+    let [what, change] = lag_in_words(seconds);
+    finding(&what, &change)
 }
 
 fn finding(what: &str, change: &str) -> Finding {
@@ -195,7 +188,7 @@ fn median(rig: &Rig, recording: &Recording) -> Option<Misfit> {
 }
 
 /// The median of pixels, or of points where there are no pixels.
-pub(super) fn misfit(errors: &Errors) -> Misfit {
+fn misfit(errors: &Errors) -> Misfit {
     if errors.observations > errors.points.observations {
         Misfit::Pixels(errors.median_px)
     } else {

@@ -1,4 +1,5 @@
 //! Explanations: one part of the rig moved, and everything else is where it was.
+use super::null::Image;
 use super::seen::Seen;
 use crate::Error;
 use crate::chain::{JointKind, LINK_PARAMETERS};
@@ -257,6 +258,30 @@ pub(super) fn distances(model: &Model, sample: &Seen) -> Vec<Vec<f64>> {
         images[spot.camera].push(if distance.is_finite() { distance } else { f64::MAX });
     }
     images
+}
+
+/// The images of a sample, under readings whose standard deviation is `noise` [rad or m].
+pub(super) fn images(model: &Model, sample: &Seen, noise: f64) -> Vec<Image> {
+    let distances = distances(model, sample);
+    let mut squares = vec![0.0; model.cameras.len()];
+    if noise > 0.0 {
+        let here = model.links(&sample.joints);
+        for joint in 0..sample.joints.len() {
+            let mut joints = sample.joints.clone();
+            joints[joint] += noise;
+            let there = model.links(&joints);
+            for spot in &sample.detections {
+                let [from, to] = [&here, &there].map(|links| model.pixel(spot.camera, spot.feature, links));
+                squares[spot.camera] += (to[0] - from[0]).powi(2) + (to[1] - from[1]).powi(2);
+            }
+        }
+    }
+    let image = |(distances, square): (Vec<f64>, f64)| {
+        // Two coordinates each.
+        let shift = (square / (2 * distances.len()).max(1) as f64).sqrt();
+        Image { distances, shift: if shift.is_finite() { shift } else { 0.0 } }
+    };
+    distances.into_iter().zip(squares).map(image).collect()
 }
 
 fn median_px(model: &Model, samples: &[Seen]) -> f64 {

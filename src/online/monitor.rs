@@ -1,5 +1,5 @@
 //! Watches samples one after the other.
-use super::blocks::{FIT_STEPS, Problem, SAME, causes, distances, explain, zero_of};
+use super::blocks::{FIT_STEPS, Problem, SAME, causes, explain, images, zero_of};
 use super::null::{Null, WINDOW, window_p_value};
 use super::seen::{Names, Seen};
 use super::{Cause, Change, Event, MonitorOptions};
@@ -88,7 +88,7 @@ impl Monitor {
             samples.push(seen);
             return self.relearn(cause, samples);
         }
-        let images = distances(&self.model, &seen);
+        let images = images(&self.model, &seen, self.rig.noise.joints);
         if !Null::can_judge(&images) {
             return Event::Skipped;
         }

@@ -137,6 +137,12 @@ pub fn evaluation_steps(rig: &Rig, evaluation: &Evaluation) -> Vec<String> {
         medians.filter(|(_, (px, m))| px.is_some() || m.is_some()).map(|(sample, _)| sample).collect();
     let changed = change::when(&judged, &fitting.findings);
     let own = evaluation.is_own.then(|| OWN.to_owned());
+    if let Some(lag) = fitting.findings.iter().find(|finding| matches!(finding, Finding::Lag { .. })) {
+        return own
+            .into_iter()
+            .chain([format!("Mend the clocks, and judge again: {}.", lag.of_evaluation())])
+            .collect();
+    }
     let changes = changed.iter().map(|when| change::words(when, &seeing));
     let mut steps: Vec<String> = own.into_iter().chain(changes).collect();
     if !off.is_empty() && off.len() == seeing.len() && seeing.len() > 1 {

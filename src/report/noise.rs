@@ -112,6 +112,7 @@ fn is_named(rig: &Rig, residual: &Residual, findings: &[Finding]) -> bool {
         | Finding::Outliers { .. }
         | Finding::UnseenCamera { .. }
         | Finding::Misfit { .. }
+        | Finding::Lag { .. }
         | Finding::MissedLength { .. }
         | Finding::FarFromGiven { .. } => false,
     };

@@ -113,6 +113,10 @@ pub(super) fn steps(subject: &Subject<'_>) -> Vec<String> {
             "Record more varied motions, or give what is known in a rig file: the fit has not settled.".to_owned(),
         );
     }
+    if let Some(lag) = report.findings.iter().find(|finding| matches!(finding, Finding::Lag { .. })) {
+        steps.push(format!("Mend the clocks, and learn again: {lag}."));
+        return steps;
+    }
     let misfit = |finding: &Finding| matches!(finding, Finding::Misfit { .. });
     steps.extend(report.findings.iter().filter(|one| misfit(one)).map(|one| format!("Find the reason: {one}.")));
     let is_seen = |index: &usize| {

@@ -4,7 +4,8 @@ mod change;
 
 use change::{KINDS, learned, look, record, unchanged};
 use handeye::online::{Cause, Event, Monitor, MonitorOptions};
-use handeye::simulate::{SimulateOptions, simulate};
+use handeye::rig::Rig;
+use handeye::simulate::{SimulateOptions, random_rig, simulate};
 
 /// Of 10 changes of each kind that are seen with a probability of 0.95, fewer than 8 are with one of 1.2 %; over all 90, 79 or
 /// fewer are with 0.5 %.
@@ -34,6 +35,26 @@ fn an_unchanged_rig_raises_no_alarm_with_wrong_detections_too() {
     let mut monitor = Monitor::new(&rigs.learned, &recording, MonitorOptions::default()).unwrap();
     let alarms = recording.samples.iter().filter(|sample| matches!(monitor.observe(sample), Event::Changed(_)));
     assert_eq!(alarms.count(), 0);
+}
+
+/// Noise of the readings shifts whole images, here by three times what pixels scatter.
+#[test]
+fn noise_of_readings_that_the_rig_states_is_no_change() {
+    for seed in 1..=5 {
+        let mut rig = random_rig(6, 2, 12, seed);
+        (rig.noise.pixels, rig.noise.joints) = (0.1, 3e-4);
+        let options = SimulateOptions { samples: 1_000, seed, ..SimulateOptions::default() };
+        let recording = simulate(&rig, &options).unwrap().recording;
+        let alarms = |rig: &Rig, burn_in: usize| {
+            let options = MonitorOptions { burn_in, ..MonitorOptions::default() };
+            let mut monitor = Monitor::new(rig, &recording, options).unwrap();
+            recording.samples.iter().filter(|sample| matches!(monitor.observe(sample), Event::Changed(_))).count()
+        };
+        // From the first sample on, and with what the first samples show of the rig's own errors.
+        assert_eq!([0, MonitorOptions::default().burn_in].map(|burn_in| alarms(&rig, burn_in)), [0, 0], "seed {seed}");
+        rig.noise.joints = 0.0;
+        assert!(alarms(&rig, 0) > 0, "seed {seed}: readings that are said to be exact are none of these");
+    }
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! A robot that pauses at its positions while all is recorded: one sample a pause, and clocks that are apart.
 use crate::bag::{bag, read_with};
 use crate::cli::Folder;
-use handeye::calibrate::{Options, calibrate};
+use handeye::calibrate::{Finding as Unfit, Options, calibrate, evaluate};
 use handeye::doctor::{Finding, examine};
 use handeye::recording::{BagOptions, Detection, OpenOptions, Recording, Sample};
+use handeye::report::evaluation_steps;
 use handeye::rig::{Model, Rig};
 use handeye::simulate::{SimulateOptions, random_rig, simulate};
 use handeye::solvers::Pose;
@@ -166,6 +167,41 @@ fn a_lag_that_the_median_hides_is_found_and_named_with_its_cure_and_repeats_lead
     }
     let (_, _, recording) = paused(24, 0.015, 0.0, 4);
     assert_eq!(findings(&recording.still().unwrap()), Vec::new(), "standstills do not show a lag");
+}
+
+/// Whoever does not check first is told of it by what is left out, and no camera is said to have moved; where one did, no lag is named.
+#[test]
+fn a_lag_behind_what_does_not_fit_is_named_by_learning_and_by_judging() {
+    let lag = |findings: &[Unfit]| match findings {
+        [Unfit::Lag { seconds, .. }, ..] => Some(*seconds),
+        _ => None,
+    };
+    for seed in 1..=3 {
+        let (rig, _, late) = paused(24, 0.05, 0.0, seed);
+        let (_, _, clean) = paused(24, 0.0, 0.0, seed);
+        let learn = |recording: &Recording| {
+            calibrate(&Rig::default(), recording, &Options::default(), &mut |_| ControlFlow::Continue(()))
+                .unwrap()
+                .report
+        };
+        let found = learn(&late).findings;
+        assert!(lag(&found).is_some_and(|seconds| (seconds + 0.05).abs() < 0.005), "seed {seed}: {found:?}");
+        assert_eq!(lag(&learn(&clean).findings), None, "seed {seed}");
+
+        let judged = evaluate(&rig, &late).unwrap();
+        let found = &judged.fitting.findings;
+        assert!(lag(found).is_some_and(|seconds| (seconds + 0.05).abs() < 0.005), "seed {seed}: {found:?}");
+        let steps = evaluation_steps(&rig, &judged);
+        assert!(
+            steps.len() == 1 && steps[0].contains("stamped 0.05") && steps[0].contains("--joint-delay"),
+            "{steps:?}"
+        );
+        let mut moved = rig.clone();
+        moved.cameras[0].pose.as_mut().unwrap().translation.x += 0.05;
+        let judged = evaluate(&moved, &clean).unwrap();
+        assert!(judged.total.rms_px > 5.0 && !judged.misfits.is_empty(), "seed {seed}: {} px", judged.total.rms_px);
+        assert_eq!(lag(&judged.fitting.findings), None, "seed {seed}");
+    }
 }
 
 /// What the check finds is what mends the bag: the joints of a moment are those stamped so much earlier.

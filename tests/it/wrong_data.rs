@@ -30,6 +30,7 @@ fn named(learned: &Calibration) -> Vec<Named> {
         Finding::Misfit { .. } => Some(Named::Misfit),
         Finding::Outliers { .. }
         | Finding::UnknownState { .. }
+        | Finding::Lag { .. }
         | Finding::MissedLength { .. }
         | Finding::FarFromGiven { .. } => None,
     };

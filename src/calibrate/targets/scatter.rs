@@ -2,9 +2,11 @@
 //! reports drift, as those of visual odometry do.
 use super::graph::{Built, State};
 use super::setup::Setup;
+use crate::calibrate::evaluate::median;
 use crate::factors::CameraFromTarget;
 use crate::rig::Parent;
 use handeye_solvers::{Covariance, Factor, Function, Pose, Vector};
+use std::ops::Range;
 
 /// Gains that are tried: shares of what is new in an error that stay. None: errors of views are independent.
 const GAINS: [f64; 9] = [0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95];
@@ -22,8 +24,14 @@ const LEVERAGES: usize = 200;
 /// Where residuals show less of the noise's variance than this, they do not tell it.
 const LEAST_SHOWN: f64 = 0.25;
 
+/// What is about equally noisy: the three coordinates of a rotation, and the two of a translation across the line of sight.
+const ALIKE: [Range<usize>; 2] = [0..3, 3..5];
+
+/// The noise of a coordinate is estimated as if so many more errors had shown what those alike show together.
+const LEANS: f64 = 10.0;
+
 /// Rotations, then translations.
-const GROUPS: [std::ops::Range<usize>; 2] = [0..3, 3..6];
+const GROUPS: [Range<usize>; 2] = [0..3, 3..6];
 
 /// A view's residual without its drift: rotation [rad], then translation [m].
 pub(super) fn residual(setup: &Setup, state: &State, index: usize) -> [f64; 6] {
@@ -116,14 +124,25 @@ fn unpredicted(setup: &Setup, errors: &[[f64; 6]], gain: f64, most: &[f64; 6]) -
     new
 }
 
-/// Standard deviations of the six numbers, from medians.
+/// Standard deviations of the six numbers, from medians. Those of a few errors may be far off, and lean on what is like them.
 fn deviations(errors: &[[f64; 6]]) -> [f64; 6] {
-    std::array::from_fn(|k| {
-        let mut sizes: Vec<f64> = errors.iter().map(|r| r[k].abs()).collect();
-        sizes.sort_by(f64::total_cmp);
-        // Half of a Gaussian is within 0.6745 standard deviations; not below what arithmetic leaves.
-        (sizes[sizes.len() / 2] / 0.6745).max(1e-9)
-    })
+    let n = errors.len() as f64;
+    let mut sigmas = std::array::from_fn(|k| deviation(errors, k..k + 1));
+    for group in ALIKE {
+        let together = deviation(errors, group.clone());
+        for sigma in &mut sigmas[group] {
+            *sigma = ((n * *sigma * *sigma + LEANS * together * together) / (n + LEANS)).sqrt();
+        }
+    }
+    sigmas
+}
+
+/// Of all these coordinates together.
+fn deviation(errors: &[[f64; 6]], coordinates: Range<usize>) -> f64 {
+    let mut sizes: Vec<f64> =
+        errors.iter().flat_map(|r| r[coordinates.clone()].iter().map(|error| error.abs())).collect();
+    // Half of a Gaussian is within 0.6745 standard deviations; not below what arithmetic leaves.
+    (median(&mut sizes) / 0.6745).max(1e-9)
 }
 
 /// `camera_from_target` of a view.
@@ -133,4 +152,40 @@ fn predicted(setup: &Setup, state: &State, index: usize) -> Pose {
     let carrier = |parent: Parent| if parent == Parent::World { Pose::identity() } else { state.tips[view.moment] };
     let (carrier, mount) = (carrier(target.parent), carrier(camera.parent));
     CameraFromTarget.compute::<f64>((carrier, state.targets[view.target], mount, state.cameras[view.camera]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    const TRUE: [f64; 6] = [0.002, 0.002, 0.002, 0.001, 0.001, 0.004];
+
+    /// By how much an estimate of each coordinate is off in 200 trials: root mean square of the logarithm.
+    fn off(n: usize, estimate: fn(&[[f64; 6]]) -> [f64; 6]) -> [f64; 6] {
+        let mut squares = [0.0; 6];
+        for seed in 0..200 {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let mut error = || TRUE.map(|sigma| sigma * random.sample::<f64, _>(StandardNormal));
+            let errors: Vec<[f64; 6]> = (0..n).map(|_| error()).collect();
+            for ((square, sigma), truth) in squares.iter_mut().zip(estimate(&errors)).zip(TRUE) {
+                *square += (sigma / truth).ln().powi(2) / 200.0;
+            }
+        }
+        squares.map(f64::sqrt)
+    }
+
+    /// Five views tell little of one coordinate, and more of those alike; that depth is noisier is not smoothed away.
+    #[test]
+    fn noise_of_few_views_leans_on_what_is_like_it() {
+        let alone = |errors: &[[f64; 6]]| std::array::from_fn(|k| deviation(errors, k..k + 1));
+        let (alone, leaning) = (off(5, alone), off(5, deviations));
+        for k in 0..5 {
+            assert!(leaning[k] < 0.8 * alone[k], "{k}: {} from its own, {} with those alike", alone[k], leaning[k]);
+        }
+        assert_eq!(alone[5], leaning[5], "depth is like nothing else");
+        assert!(off(400, deviations).iter().all(|off| *off < 0.08), "{:?}", off(400, deviations));
+    }
 }
