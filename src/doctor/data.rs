@@ -102,7 +102,7 @@ fn one_joint(recording: &Recording) -> Option<Finding> {
 }
 
 /// All rotations about one axis leave the positions along it open.
-fn one_axis(tips: &[Option<Pose>]) -> Option<Finding> {
+pub(super) fn one_axis(tips: &[Option<Pose>]) -> Option<Finding> {
     let tips: Vec<Pose> = tips.iter().flatten().copied().collect();
     let n = tips.len();
     if n < 3 {

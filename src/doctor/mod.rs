@@ -127,7 +127,7 @@ pub fn examine_watched(
     }
     let tips = tips(rig, recording, f64::to_owned);
     let mut diagnosis = Diagnosis { findings: data::findings(rig, recording, &tips), ..Diagnosis::default() };
-    let turns_freely = !diagnosis.findings.iter().any(|finding| finding.about == About::Turns);
+    let turns_freely = data::one_axis(&tips).is_none();
     if let Some(pairs) = poses::Pairs::new(rig, recording, &tips).filter(|_| turns_freely) {
         let has_poses = recording.samples.iter().any(|sample| sample.pose.is_some());
         let other_tips = if has_poses { Vec::new() } else { other_tips(rig, recording) };

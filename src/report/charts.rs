@@ -103,14 +103,15 @@ pub(super) fn histogram(
 
 /// Where every joint has been: a strip each, between its limits where they are known.
 pub(super) fn strips(strips: &[Strip]) -> String {
-    let height = 34.0 * strips.len() as f64 + 10.0;
+    // A name may be long, and stands above its strip.
+    let height = 46.0 * strips.len() as f64;
     let mut svg = open(600.0, height);
     for (row, strip) in strips.iter().enumerate() {
-        let y = 34.0 * row as f64 + 20.0;
+        let y = 46.0 * row as f64 + 32.0;
         let [low, high] = strip.range;
-        let x = |value: f64| 170.0 + 360.0 * (value - low) / (high - low).max(1e-12);
-        let _ = write!(svg, "<text x=\"0\" y=\"{:.0}\">{}</text>", y + 4.0, escaped(&strip.name));
-        let _ = write!(svg, "<path class=\"axis\" d=\"M170 {y}H530\"/>");
+        let x = |value: f64| 60.0 + 480.0 * (value - low) / (high - low).max(1e-12);
+        let _ = write!(svg, "<text x=\"0\" y=\"{:.0}\">{}</text>", y - 14.0, escaped(&strip.name));
+        let _ = write!(svg, "<path class=\"axis\" d=\"M60 {y}H540\"/>");
         for value in strip.values.iter().step_by(strip.values.len().div_ceil(400).max(1)) {
             let _ = write!(
                 svg,
@@ -120,8 +121,8 @@ pub(super) fn strips(strips: &[Strip]) -> String {
                 y + 7.0
             );
         }
-        let _ = write!(svg, "<text x=\"164\" y=\"{0:.0}\" text-anchor=\"end\">{low:.2}</text>", y + 4.0);
-        let _ = write!(svg, "<text x=\"536\" y=\"{0:.0}\">{high:.2}</text>", y + 4.0);
+        let _ = write!(svg, "<text x=\"54\" y=\"{0:.0}\" text-anchor=\"end\">{low:.2}</text>", y + 4.0);
+        let _ = write!(svg, "<text x=\"546\" y=\"{0:.0}\">{high:.2}</text>", y + 4.0);
     }
     svg + "</svg>"
 }

@@ -159,8 +159,7 @@ pub(super) fn steps(subject: &Subject<'_>) -> Vec<String> {
     };
     if report.findings.iter().any(|finding| !explained(finding)) {
         steps.push(
-            "What does not fit was left out, so nothing has to be mended before the rig is used; to use it too, mend the recording where it \
-             is a mistake, and learn again."
+            "Use the rig: what does not fit was left out of it. Where that is a mistake of the recording, mending it gives more to learn from."
                 .to_owned(),
         );
     }

@@ -106,7 +106,10 @@ fn every_mistake_in_a_rig_file_is_told_with_its_place_and_what_would_do() {
             "[[cameras]]\nname = 'left'\n[estimate]\nfixed = ['robot.base', @'cameras.lefd.fx']\n",
             "unknown `lefd` (did you mean `left`?)",
         ),
-        ("[estimate]\nfixed = [@'cameras.*.focal']\n", "unknown `focal` (known: pose, fx, fy, cx, cy, distortion)"),
+        (
+            "[estimate]\nfixed = [@'cameras.*.focal']\n",
+            "unknown `focal` (known: pose, fx, fy, cx, cy, distortion, intrinsics)",
+        ),
         ("[estimate]\nfixed = [@'camera']\n", "(did you mean `cameras`?)"),
         ("[estimate]\nfixed = [@'robot.base.xyz']\n", "there is nothing below `robot.base`"),
         ("[estimate]\nfixed = @'robot'\n", "expected an array, found a string"),

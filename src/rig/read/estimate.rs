@@ -119,8 +119,8 @@ pub(super) fn problem_of_pattern(pattern: &str, rig: &Rig) -> Option<String> {
     let features: Vec<&str> = rig.features.iter().map(|feature| feature.name.as_str()).collect();
     let targets: Vec<&str> = rig.targets.iter().map(|target| target.name.as_str()).collect();
     let joint_fields: Vec<&str> = JointField::ALL.iter().map(|field| field.name()).collect();
-    let camera_fields: Vec<&str> =
-        ["pose", INTRINSICS].into_iter().chain(CameraField::ALL.iter().map(|field| field.name())).collect();
+    let lens = CameraField::ALL.iter().map(|field| field.name());
+    let camera_fields: Vec<&str> = std::iter::once("pose").chain(lens).chain([INTRINSICS]).collect();
     // What may stand at each place of a path, for each kind of parameter; an empty list is any name.
     let grammar: [&[&[&str]]; 5] = [
         &[&["robot"], &["base"]],
