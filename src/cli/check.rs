@@ -11,7 +11,7 @@ use clap::Args;
 use handeye::Error;
 use handeye::calibrate::{Options, states_in_words};
 use handeye::doctor::{Diagnosis, Misfit, examine_watched};
-use handeye::rig::{Camera, Model, Noise, Parent, Rig};
+use handeye::rig::{Camera, Model, Parent, Rig};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -102,8 +102,8 @@ impl Check {
                     &format!("\nhypotheses are held against {thinned_to} of the {samples} samples, spread evenly\n");
             }
             json["thinned_to"] = json!(diagnosis.thinned_to);
-            text += &format!("\n{}", tell(&diagnosis, &rig.noise));
-            json["misfit_over_noise"] = json!(over_noise(&diagnosis, &rig.noise));
+            text += &format!("\n{}", tell(&diagnosis));
+            json["misfit_over_noise"] = json!(over_noise(&diagnosis));
             json["scores"] = diagnosis
                 .scores
                 .iter()
@@ -128,11 +128,12 @@ fn lines(lines: &[String]) -> String {
 }
 
 /// The misfit of the data as recorded, in relation to noise.
-fn over_noise(diagnosis: &Diagnosis, noise: &Noise) -> Option<f64> {
-    diagnosis.scores.first()?.misfit?.over_noise(noise)
+fn over_noise(diagnosis: &Diagnosis) -> Option<f64> {
+    diagnosis.scores.first()?.misfit?.over_noise(&diagnosis.noise)
 }
 
-fn tell(diagnosis: &Diagnosis, noise: &Noise) -> String {
+fn tell(diagnosis: &Diagnosis) -> String {
+    let noise = &diagnosis.noise;
     let mut table = Table::new(&["if", "median misfit"]);
     for score in &diagnosis.scores {
         let cell = score.misfit.map_or_else(|| "no fit".to_owned(), |misfit| misfit.to_string());

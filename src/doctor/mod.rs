@@ -98,6 +98,8 @@ pub struct Diagnosis {
     pub findings: Vec<Finding>,
     /// Why nothing could be learned from the data as recorded, where that is so.
     pub unsolved: Option<String>,
+    /// The rig's `[noise]`, with what noise of the readings adds to pixels and points: what a misfit is held against.
+    pub noise: Noise,
     /// How many samples calibrations looked at, where that is not all: a long recording is thinned, evenly.
     pub thinned_to: Option<usize>,
 }
@@ -123,10 +125,11 @@ pub fn examine_watched(
     watch: &mut Watch<'_>,
 ) -> Diagnosis {
     if let Some(finding) = data::another_order(rig, recording) {
-        return Diagnosis { findings: vec![finding], ..Diagnosis::default() };
+        return Diagnosis { findings: vec![finding], noise: rig.noise, ..Diagnosis::default() };
     }
     let tips = tips(rig, recording, f64::to_owned);
-    let mut diagnosis = Diagnosis { findings: data::findings(rig, recording, &tips), ..Diagnosis::default() };
+    let findings = data::findings(rig, recording, &tips);
+    let mut diagnosis = Diagnosis { findings, noise: rig.noise, ..Diagnosis::default() };
     let turns_freely = data::one_axis(&tips).is_none();
     if let Some(pairs) = poses::Pairs::new(rig, recording, &tips).filter(|_| turns_freely) {
         let has_poses = recording.samples.iter().any(|sample| sample.pose.is_some());

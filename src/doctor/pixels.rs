@@ -5,7 +5,9 @@ use super::lag::lag;
 use super::thin::{thin, thinned, with_fewer_features};
 use super::{About, Diagnosis, Finding, Misfit, Score, Watch, is_clearly_better};
 use crate::Error;
-use crate::calibrate::{self, Calibration, Errors, Finding as Unfit, Motion, calibrate, evaluate, lag_in_words};
+use crate::calibrate::{
+    self, Calibration, Errors, Evaluation, Finding as Unfit, Motion, ReadingNoise, calibrate, evaluate, lag_in_words,
+};
 use crate::recording::Recording;
 use crate::rig::{Noise, Rig};
 use std::ops::ControlFlow;
@@ -37,7 +39,13 @@ pub(super) fn examine(
         return;
     }
     let (as_recorded, learned, found) = match learn(rig, recording, options, "as recorded", watch) {
-        Ok(learned) => (median(&learned.rig, recording), Some(learned.rig), learned.report.findings),
+        Ok(learned) => {
+            let judged = evaluate(&learned.rig, recording).ok();
+            if let Some(judged) = &judged {
+                diagnosis.noise = with_readings(&rig.noise, &judged.reading_noise.0);
+            }
+            (judged.and_then(|judged| of(&judged)), Some(learned.rig), learned.report.findings)
+        }
         Err(error) => {
             diagnosis.unsolved = Some(error.to_string());
             if error.is_input() {
@@ -47,6 +55,7 @@ pub(super) fn examine(
         }
     };
     diagnosis.scores.push(Score { alternative: "as recorded".into(), misfit: as_recorded });
+    let noise = diagnosis.noise;
     let options = &calibrate::Options { iterations: options.iterations.min(ITERATIONS), ..options.clone() };
 
     // What free intrinsics can hide shows where they are held.
@@ -71,15 +80,15 @@ pub(super) fn examine(
         let reference = *reference.get_or_insert_with(|| {
             if is_held { score(&held, recording, options, "as recorded", watch) } else { as_recorded }
         });
-        consider(alternative, misfit, reference, &rig.noise, &mut best, diagnosis);
+        consider(alternative, misfit, reference, &noise, &mut best, diagnosis);
     }
-    let explains = |misfit: &Misfit| misfit.is_explained(&rig.noise);
+    let explains = |misfit: &Misfit| misfit.is_explained(&noise);
     let is_fine = |best: &Option<(Misfit, Finding)>| best.as_ref().is_some_and(|(misfit, _)| explains(misfit));
     if !is_fine(&best) && !as_recorded.as_ref().is_some_and(explains) {
         for alternative in alternatives::all(rig, whole) {
             let recording = thinned(&alternative.recording);
             let misfit = score(&alternative.rig, &recording, options, &alternative.name, watch);
-            consider(alternative, misfit, as_recorded, &rig.noise, &mut best, diagnosis);
+            consider(alternative, misfit, as_recorded, &noise, &mut best, diagnosis);
             if is_fine(&best) {
                 break;
             }
@@ -97,7 +106,7 @@ pub(super) fn examine(
         diagnosis.scores.push(Score { alternative: format!("{what}, where it moves fastest"), misfit: without });
         let beaten = best.as_ref().map(|(best, _)| FINER * best.size());
         let is_lag = is_clearly_better(without, as_it_moves);
-        if let Some(misfit) = misfit.filter(|misfit| is_lag || is_right(About::Order, *misfit, as_recorded, &rig.noise))
+        if let Some(misfit) = misfit.filter(|misfit| is_lag || is_right(About::Order, *misfit, as_recorded, &noise))
             && beaten.is_none_or(|beaten| misfit.size() < beaten)
         {
             best = Some((misfit, of_lag(lag.seconds)));
@@ -183,8 +192,21 @@ fn score(
 
 /// How well a learned rig explains all of a recording.
 fn median(rig: &Rig, recording: &Recording) -> Option<Misfit> {
-    let misfit = misfit(&evaluate(rig, recording).ok()?.total);
+    of(&evaluate(rig, recording).ok()?)
+}
+
+fn of(evaluation: &Evaluation) -> Option<Misfit> {
+    let misfit = misfit(&evaluation.total);
     misfit.size().is_finite().then_some(misfit)
+}
+
+/// Noise of a coordinate of pixels and points with what noise of the readings moves them by.
+fn with_readings(noise: &Noise, of_readings: &ReadingNoise) -> Noise {
+    Noise {
+        pixels: noise.pixels.hypot(of_readings.px / 2.0_f64.sqrt()),
+        points: noise.points.hypot(of_readings.m / 3.0_f64.sqrt()),
+        ..*noise
+    }
 }
 
 /// The median of pixels, or of points where there are no pixels.

@@ -274,6 +274,19 @@ fn a_check_says_that_it_fits_only_where_noise_explains_the_misfit() {
     }
 }
 
+/// A prediction has the noise of what was read, here several times that of pixels, as `evaluate` says too.
+#[test]
+fn noise_of_readings_that_the_rig_states_explains_a_misfit() {
+    let mut rig = catalog::rig("ur5").unwrap();
+    (rig.noise.pixels, rig.noise.joints) = (0.05, 5e-4);
+    let options = SimulateOptions { samples: 20, ..SimulateOptions::default() };
+    let recording = simulate(&rig, &options).unwrap().recording;
+    let diagnosis = examine(&rig, &recording, &Options::default());
+    let misfit = diagnosis.scores[0].misfit.unwrap();
+    assert!(misfit.is_explained(&diagnosis.noise) && !misfit.is_explained(&rig.noise), "{misfit}");
+    assert_eq!((diagnosis.findings, diagnosis.scores.len()), (Vec::new(), 1));
+}
+
 /// Encoders are noisy and limits rounded: what the table of `check` counts as outside is what is found.
 #[test]
 fn readings_outside_of_limits_are_counted_alike_by_the_table_and_the_finding() {
