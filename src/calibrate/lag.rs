@@ -20,10 +20,10 @@ const FASTEST: f64 = 1.0 / 3.0;
 /// So many of them at most are looked at, spread evenly.
 const MOST: usize = 100;
 
-/// A lag is one where the misfit without it is below this share of that with it.
-const CLEARLY_BETTER: f64 = 0.5;
+/// A mistake is named where the misfit without it is below this share of that with it.
+pub(crate) const CLEARLY_BETTER: f64 = 0.5;
 
-/// Half of the finest step, in sample periods: two lags that are nearer are the same.
+/// Two lags that are nearer than this are the same: one and a half of the finer steps [sample periods].
 pub(crate) const SAME: f64 = 1.5 * FINER_STEP;
 
 /// The lag behind what does not fit a rig, where there is one; `None` where nothing was found that a lag would explain.
@@ -63,6 +63,19 @@ fn is_clearly_better([with, without]: [Distance; 2]) -> bool {
     without.size() < CLEARLY_BETTER * with.size()
 }
 
+/// The median distance of all that a recording shows from where a rig predicts it: of pixels, or of points where they are more. `None` where nothing
+/// can be compared.
+pub(crate) fn usual_distance(rig: &Rig, recording: &Recording) -> Option<Distance> {
+    let mut all = Distances::default();
+    for of_sample in distances(rig, recording).ok()? {
+        of_sample.cameras.iter().for_each(|seen| all.extend(seen));
+    }
+    let (mut px, mut m) = (all.px(), all.points);
+    let distance =
+        if px.len() > m.len() { Distance::Pixels(median(&mut px)) } else { Distance::Metres(median(&mut m)) };
+    (px.len() + m.len() > 0 && distance.size().is_finite()).then_some(distance)
+}
+
 /// A recording that is dense in time.
 pub(crate) struct Motion<'a> {
     pub recording: &'a Recording,
@@ -89,14 +102,7 @@ impl<'a> Motion<'a> {
 
     /// Of the fastest samples, with joints that were stamped `lag` [s] later.
     pub fn misfit(&self, rig: &Rig, lag: f64) -> Option<Distance> {
-        let mut all = Distances::default();
-        for of_sample in distances(rig, &interpolated(self.recording, &self.fastest, lag)).ok()? {
-            of_sample.cameras.iter().for_each(|seen| all.extend(seen));
-        }
-        let (mut px, mut m) = (all.px(), all.points);
-        let distance =
-            if px.len() > m.len() { Distance::Pixels(median(&mut px)) } else { Distance::Metres(median(&mut m)) };
-        (px.len() + m.len() > 0 && distance.size().is_finite()).then_some(distance)
+        usual_distance(rig, &interpolated(self.recording, &self.fastest, lag))
     }
 
     /// Of several that are as good the smallest.

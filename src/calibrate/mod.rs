@@ -60,7 +60,9 @@ pub(crate) use evaluate::{Correspondence, median};
 pub use findings::findings_in_words;
 pub use fitting::Fitting;
 pub use influence::{Influence, most_influential, worst_fitting};
-pub(crate) use lag::{Motion, SAME as SAME_LAG, in_words as lag_in_words, interpolated};
+pub(crate) use lag::{
+    CLEARLY_BETTER, Motion, SAME as SAME_LAG, in_words as lag_in_words, interpolated, usual_distance,
+};
 pub(crate) use misfit::over_noise;
 pub(crate) use observation::Kind;
 pub(crate) use outliers::{is_wrong, yardstick};
@@ -69,6 +71,7 @@ pub(crate) use placed::Placed;
 pub use priors::assumptions;
 pub(crate) use priors::prior_sds;
 pub use reading_noise::ReadingNoise;
+pub(crate) use reading_noise::by_joint as displaced_by_joint;
 pub use relearn::relearn;
 pub use report::{Calibration, Distance, Finding, Report, StageReport, TipDeviation, length_in_words};
 pub use selection::{NoiseTrial, select_noise};

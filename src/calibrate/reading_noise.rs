@@ -47,16 +47,21 @@ impl ReadingNoise {
     }
 }
 
+/// The links with the reading of every joint off by `sd` [rad or m], one at a time; none where it is exact.
+pub(crate) fn by_joint(model: &Model, joints: &[f64], sd: f64) -> Vec<Vec<Pose>> {
+    let moved = |joint: usize| {
+        let mut joints = joints.to_vec();
+        joints[joint] += sd;
+        model.links(&joints)
+    };
+    if sd > 0.0 { (0..joints.len()).map(moved).collect() } else { Vec::new() }
+}
+
 /// The links with every number of a sample's reading off by its standard deviation, one at a time.
 fn displaced(rig: &Rig, model: &Model, sample: &Sample) -> Vec<Vec<Pose>> {
     let noise = &rig.noise;
     if let Some(joints) = &sample.joints {
-        let moved = |joint: usize| {
-            let mut joints = joints.clone();
-            joints[joint] += noise.joints;
-            model.links(&joints)
-        };
-        return if noise.joints > 0.0 { (0..joints.len()).map(moved).collect() } else { Vec::new() };
+        return by_joint(model, joints, noise.joints);
     }
     let Some(pose) = sample.pose.filter(|_| noise.pose.is_noisy()) else { return Vec::new() };
     let moved = |axis: usize| {

@@ -10,14 +10,11 @@ mod undo;
 
 pub(crate) use data::repeats;
 
-use crate::calibrate::{self, Distance};
+use crate::calibrate::{self, CLEARLY_BETTER, Distance};
 use crate::chain::JointKind;
 use crate::recording::Recording;
 use crate::rig::{Model, Noise, Rig};
 use handeye_solvers::Pose;
-
-/// An alternative is a finding where its misfit is below this share of the misfit as recorded.
-const CLEARLY_BETTER: f64 = 0.5;
 
 /// Up to so many times what noise alone would leave, noise explains a misfit; beyond, it is a mistake or a rig that is not this one.
 const EXPLAINED: f64 = 1.7;

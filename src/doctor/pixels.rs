@@ -6,10 +6,10 @@ use super::thin::{thin, thinned, with_fewer_features};
 use super::{About, Diagnosis, Finding, Misfit, Score, Watch, is_clearly_better};
 use crate::Error;
 use crate::calibrate::{
-    self, Calibration, Errors, Evaluation, Finding as Unfit, Motion, ReadingNoise, calibrate, evaluate, lag_in_words,
+    self, Calibration, Finding as Unfit, Motion, ReadingNoise, calibrate, lag_in_words, usual_distance,
 };
 use crate::recording::Recording;
-use crate::rig::{Noise, Rig};
+use crate::rig::{Model, Noise, Rig};
 use std::ops::ControlFlow;
 
 /// An alternative fits in itself where its misfit is below this many times what noise leaves.
@@ -40,11 +40,8 @@ pub(super) fn examine(
     }
     let (as_recorded, learned, found) = match learn(rig, recording, options, "as recorded", watch) {
         Ok(learned) => {
-            let judged = evaluate(&learned.rig, recording).ok();
-            if let Some(judged) = &judged {
-                diagnosis.noise = with_readings(&rig.noise, &judged.reading_noise.0);
-            }
-            (judged.and_then(|judged| of(&judged)), Some(learned.rig), learned.report.findings)
+            diagnosis.noise = with_readings(&learned.rig, recording);
+            (misfit(&learned.rig, recording), Some(learned.rig), learned.report.findings)
         }
         Err(error) => {
             diagnosis.unsolved = Some(error.to_string());
@@ -187,33 +184,20 @@ fn score(
     watch: &mut Watch<'_>,
 ) -> Option<Misfit> {
     let (rig, recording) = with_fewer_features(rig, recording);
-    median(&learn(&rig, &recording, options, hypothesis, watch).ok()?.rig, &recording)
+    misfit(&learn(&rig, &recording, options, hypothesis, watch).ok()?.rig, &recording)
 }
 
 /// How well a learned rig explains all of a recording.
-fn median(rig: &Rig, recording: &Recording) -> Option<Misfit> {
-    of(&evaluate(rig, recording).ok()?)
+fn misfit(rig: &Rig, recording: &Recording) -> Option<Misfit> {
+    usual_distance(rig, recording).map(Misfit::from)
 }
 
-fn of(evaluation: &Evaluation) -> Option<Misfit> {
-    let misfit = misfit(&evaluation.total);
-    misfit.size().is_finite().then_some(misfit)
-}
-
-/// Noise of a coordinate of pixels and points with what noise of the readings moves them by.
-fn with_readings(noise: &Noise, of_readings: &ReadingNoise) -> Noise {
+/// A rig's noise of a coordinate of pixels and points, with what noise of the readings moves them by.
+fn with_readings(rig: &Rig, recording: &Recording) -> Noise {
+    let of_readings = Model::new(rig).map(|model| ReadingNoise::new(rig, &model, recording).0).unwrap_or_default();
     Noise {
-        pixels: noise.pixels.hypot(of_readings.px / 2.0_f64.sqrt()),
-        points: noise.points.hypot(of_readings.m / 3.0_f64.sqrt()),
-        ..*noise
-    }
-}
-
-/// The median of pixels, or of points where there are no pixels.
-fn misfit(errors: &Errors) -> Misfit {
-    if errors.observations > errors.points.observations {
-        Misfit::Pixels(errors.median_px)
-    } else {
-        Misfit::Points(errors.points.median_m)
+        pixels: rig.noise.pixels.hypot(of_readings.px / 2.0_f64.sqrt()),
+        points: rig.noise.points.hypot(of_readings.m / 3.0_f64.sqrt()),
+        ..rig.noise
     }
 }

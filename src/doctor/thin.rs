@@ -47,24 +47,15 @@ const SEED: u64 = 1;
 
 /// Rig and recording with fewer features in images that show many; the same where lengths between features are given.
 pub(super) fn with_fewer_features(rig: &Rig, recording: &Recording) -> (Rig, Recording) {
-    let (mut rig, mut recording) = (rig.clone(), recording.clone());
+    let mut rig = rig.clone();
     if rig.estimate.tag_side.is_some() || !rig.estimate.lengths.is_empty() {
-        return (rig, recording);
+        return (rig, recording.clone());
     }
-    let is_kept = choose(&recording);
-    let dropped: Vec<&String> =
-        recording.features.iter().zip(&is_kept).filter(|(_, kept)| !**kept).map(|(name, _)| name).collect();
-    rig.features.retain(|feature| !dropped.contains(&&feature.name));
-    let mut place = 0..;
-    let places: Vec<Option<u32>> = is_kept.iter().map(|kept| kept.then(|| place.next()).flatten()).collect();
-    recording.features =
-        recording.features.iter().zip(&is_kept).filter(|(_, kept)| **kept).map(|(name, _)| name.clone()).collect();
-    let moved = |feature: &mut u32| places[*feature as usize].map(|place| *feature = place).is_some();
-    for sample in &mut recording.samples {
-        sample.pixels.retain_mut(|seen| moved(&mut seen.feature));
-        sample.points.retain_mut(|seen| moved(&mut seen.feature));
-    }
-    (rig, recording)
+    let is_kept = choose(recording);
+    let is_dropped =
+        |name: &String| recording.features.iter().zip(&is_kept).any(|(known, kept)| !kept && known == name);
+    rig.features.retain(|feature| !is_dropped(&feature.name));
+    (rig, recording.select_features(|feature| is_kept[feature]))
 }
 
 /// Which features stay: one after another is left out, as long as all images that show it keep enough.

@@ -2,6 +2,7 @@
 use super::null::Image;
 use super::seen::Seen;
 use crate::Error;
+use crate::calibrate::displaced_by_joint;
 use crate::chain::{JointKind, LINK_PARAMETERS};
 use crate::factors::{ForwardKinematics, Intrinsics, Reprojection};
 use crate::rig::{Model, Parent, Rig};
@@ -264,16 +265,11 @@ pub(super) fn distances(model: &Model, sample: &Seen) -> Vec<Vec<f64>> {
 pub(super) fn images(model: &Model, sample: &Seen, noise: f64) -> Vec<Image> {
     let distances = distances(model, sample);
     let mut squares = vec![0.0; model.cameras.len()];
-    if noise > 0.0 {
-        let here = model.links(&sample.joints);
-        for joint in 0..sample.joints.len() {
-            let mut joints = sample.joints.clone();
-            joints[joint] += noise;
-            let there = model.links(&joints);
-            for spot in &sample.detections {
-                let [from, to] = [&here, &there].map(|links| model.pixel(spot.camera, spot.feature, links));
-                squares[spot.camera] += (to[0] - from[0]).powi(2) + (to[1] - from[1]).powi(2);
-            }
+    let here = model.links(&sample.joints);
+    for there in displaced_by_joint(model, &sample.joints, noise) {
+        for spot in &sample.detections {
+            let [from, to] = [&here, &there].map(|links| model.pixel(spot.camera, spot.feature, links));
+            squares[spot.camera] += (to[0] - from[0]).powi(2) + (to[1] - from[1]).powi(2);
         }
     }
     let image = |(distances, square): (Vec<f64>, f64)| {

@@ -3,8 +3,9 @@
 //! The measure of an image is the median pixel distance m of its n detections, which a few wrong ones do not move. With
 //! Gaussian pixel noise σ, distances have Rayleigh's distribution: m is about σ √(2 ln 2), and ln m scatters by
 //! 1/(2 ln 2 √n). A learned rig errs itself, by more at some positions than at others, which scales m and adds to the scatter; both
-//! are estimated from the first samples, robustly. Noise of the joint readings, where the rig states it, shifts an image as a whole: it
-//! widens m by what it adds to σ, and ln m by as much as a single distance scatters where it is all of it. p values are Chernoff's bound on the Gaussian tail of ln m.
+//! are estimated from the first samples, robustly. Noise of the joint readings, where the rig states it, shifts an image as a
+//! whole: it widens m by what it adds to σ, and ln m by as much as a single distance scatters where it is all of it. p values
+//! are Chernoff's bound on the Gaussian tail of ln m.
 //! One bad sample is no change: two of the last [`WINDOW`] have to be improbable.
 use crate::calibrate::median;
 

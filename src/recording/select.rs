@@ -22,6 +22,22 @@ impl Recording {
             samples: kept.map(select).collect(),
         }
     }
+
+    /// The same samples with the features alone whose index is kept, numbered anew.
+    pub fn select_features(&self, keep: impl Fn(usize) -> bool) -> Recording {
+        let mut places = 0..;
+        let places: Vec<Option<u32>> =
+            (0..self.features.len()).map(|index| keep(index).then(|| places.next()).flatten()).collect();
+        let mut selected = self.clone();
+        let mut index = 0..;
+        selected.features.retain(|_| index.next().is_some_and(&keep));
+        let moved = |feature: &mut u32| places[*feature as usize].map(|place| *feature = place).is_some();
+        for sample in &mut selected.samples {
+            sample.pixels.retain_mut(|seen| moved(&mut seen.feature));
+            sample.points.retain_mut(|seen| moved(&mut seen.feature));
+        }
+        selected
+    }
 }
 
 #[cfg(test)]
