@@ -216,7 +216,9 @@ impl Calibration {
     #[getter]
     fn tip(&self) -> Option<TipDeviation> {
         let tip = self.report().tip?;
-        Some(TipDeviation { median: tip.median, largest: tip.largest, by_data: tip.by_data, metric: tip.metric })
+        let library::TipDeviation { median, largest, by_data, sources, metric } = tip;
+        let library::Sources { robot, cameras, features, lengths, .. } = sources;
+        Some(TipDeviation { median, largest, by_data, robot, cameras, features, lengths, metric })
     }
 
     /// Standard deviations of what was learned, by parameter path: see ``Rig.deviations``.
@@ -353,8 +355,16 @@ pub struct TipDeviation {
     median: f64,
     /// Largest over the samples.
     largest: f64,
-    /// Median of what the data alone answer for, without what a prior determines more than they do.
+    /// What errors of the recording account for, of the median: the squares of this and the next four add up to its square.
     by_data: f64,
+    /// What errors of the robot's numbers as they were given account for.
+    robot: f64,
+    /// What errors of cameras' poses and lenses as they were given account for.
+    cameras: f64,
+    /// What errors of features as they were given account for.
+    features: f64,
+    /// What errors of lengths that were measured account for, sides of tags among them.
+    lengths: f64,
     /// True where it is in metres.
     metric: bool,
 }

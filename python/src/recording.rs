@@ -63,11 +63,11 @@ impl Recording {
     ///
     /// rig: its joints give names and order; joints: names from base to tip, of those in the file. cameras: name -> calibration file (YAML of ROS,
     /// OpenCV or Kalibr), or what is known as in ``from_arrays``; a lens replaces that of the file. still: one sample of each standstill of the
-    /// robot, and none of its motions.
+    /// robot, and none of its motions. joint_delay [s]: what is added to the stamps of the robot's readings, where its clock is behind the cameras'.
     ///
     /// For bags: ``joint_topic`` and ``pose_topic``, where there are several; ``frames``, (base, tip) for tip poses from TF;
     /// ``camera_topics``, topic -> name of the camera or ``None`` (that of its frame); ``join`` [s], by how much images of one sample may
-    /// differ; ``joint_delay`` [s], what is added to the stamps of the robot's states. For tables: ``degrees``, true or names, where joints are in degrees without saying so; ``radians``, where they are not even
+    /// differ. For tables: ``degrees``, true or names, where joints are in degrees without saying so; ``radians``, where they are not even
     /// beyond two turns; ``actions``, whether LeRobot's are ``"targets"`` or ``"motions"`` (left out otherwise); ``episodes``, those to read.
     ///
     /// What has to be said of a file (states that were interpolated, samples left out) is in ``notes``, and comes as a warning. Raises
@@ -122,13 +122,13 @@ impl Recording {
                 .map(|(name, known)| read_camera(&name, &known))
                 .collect::<PyResult<_>>()?,
             still,
+            joint_delay,
             bag: BagOptions {
                 joint_topic,
                 pose_topic,
                 frames,
                 camera_topics: camera_topics.into_iter().flatten().collect(),
                 join,
-                joint_delay,
             },
             table: TableOptions { angles, actions, episodes: episodes.unwrap_or_default() },
         };

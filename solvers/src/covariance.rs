@@ -1,12 +1,15 @@
 //! How well the data determine what was estimated.
 use crate::derivative::Derivative;
-use crate::graph::{Graph, Role};
+use crate::graph::{FactorKey, Graph, Role};
 use crate::layout::Layout;
 use crate::linear::LinearSolver;
 use crate::workspace::Take;
 use crate::{Error, Key, Solver};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVectorView, DVectorViewMut};
 use std::ops::Range;
+
+/// Per free node, derivatives over its columns.
+type Derivatives = [(u32, DMatrix<f64>)];
 
 /// The covariance H⁻¹ of a graph where its nodes are now, to be asked for its blocks.
 ///
@@ -65,19 +68,68 @@ impl<'a> Covariance<'a> {
         let (wanted, given) = (columns(layout, &of_a), columns(layout, &of_b));
         let mut result = DMatrix::zeros(self.graph.nodes[a.index()].tangent, self.graph.nodes[b.index()].tangent);
         for coordinate in 0..result.ncols() {
-            self.y.fill(0.0);
-            for ((_, matrix), columns) in of_b.iter().zip(&given) {
-                for (y, g) in self.y[columns.clone()].iter_mut().zip(matrix.row(coordinate).iter()) {
-                    *y += g;
-                }
-            }
-            self.solver.linear.solve_part(&mut self.y, &given, &wanted);
-            for ((_, matrix), columns) in of_a.iter().zip(&wanted) {
-                let part = nalgebra::DVectorView::from_slice(&self.y[columns.clone()], columns.len());
-                result.column_mut(coordinate).gemv(1.0, matrix, &part, 1.0);
-            }
+            self.solve_for(&of_b, coordinate, &given, &wanted);
+            multiply(&of_a, &wanted, &self.y, result.column_mut(coordinate));
         }
         result
+    }
+
+    /// The parts of a node's covariance that errors of each group of factors account for: Σ Jᵀ J Σ, with J the whitened derivatives of a
+    /// group. H is the sum of Jᵀ J over all factors, so the parts of groups that hold all of them add up to the covariance.
+    ///
+    /// ```
+    /// use handeye_solvers::{Covariance, Graph, Vector};
+    /// let mut graph = Graph::new();
+    /// let x = graph.free(Vector::<1>::zeros());
+    /// let [rough, fine] = [2.0, 1.0].map(|sigma| vec![graph.prior(x, &Vector::<1>::zeros(), &[sigma])]);
+    /// let parts = Covariance::new(&graph)?.due_to(x, &[rough, fine]);
+    /// assert!((parts[0][(0, 0)] - 0.16).abs() < 1e-12 && (parts[1][(0, 0)] - 0.64).abs() < 1e-12);
+    /// # Ok::<(), handeye_solvers::Error>(())
+    /// ```
+    pub fn due_to<V>(&mut self, node: Key<V>, groups: &[Vec<FactorKey>]) -> Vec<DMatrix<f64>> {
+        let tangent = self.graph.nodes[node.index()].tangent;
+        let layout = &self.solver.workspace.layout;
+        let mut derivative = Derivative::new(self.graph, layout);
+        let of_node = derivative.of(node.index);
+        let given = columns(layout, &of_node);
+        let mut of_factor = |&factor: &FactorKey| {
+            let (residual, of) = derivative.of_factor(factor);
+            let columns = columns(layout, &of);
+            (of, columns, DMatrix::zeros(residual.len(), tangent))
+        };
+        let mut factors: Vec<Vec<_>> = groups.iter().map(|group| group.iter().map(&mut of_factor).collect()).collect();
+        let mut wanted: Vec<Range<usize>> =
+            factors.iter().flatten().flat_map(|(_, columns, _)| columns.iter().cloned()).collect();
+        wanted.sort_unstable_by_key(|columns| columns.start);
+        wanted.dedup();
+        for coordinate in 0..if wanted.is_empty() { 0 } else { tangent } {
+            self.solve_for(&of_node, coordinate, &given, &wanted);
+            for (of, columns, moved) in factors.iter_mut().flatten() {
+                multiply(of, columns, &self.y, moved.column_mut(coordinate));
+            }
+        }
+        let sum = |group: &Vec<(_, _, DMatrix<f64>)>| {
+            group.iter().fold(DMatrix::zeros(tangent, tangent), |sum, (_, _, moved)| sum + moved.tr_mul(moved))
+        };
+        factors.iter().map(sum).collect()
+    }
+
+    /// Whitened derivatives J of a factor where the nodes are now, by the [`Key::index`] of the free nodes that it depends on: a row per
+    /// coordinate of its residual, a column per coordinate of the node's step that is not held. H is the sum of Jᵀ J.
+    pub fn jacobian(&self, factor: FactorKey) -> Vec<(usize, DMatrix<f64>)> {
+        let mut derivative = Derivative::new(self.graph, &self.solver.workspace.layout);
+        derivative.of_factor(factor).1.into_iter().map(|(node, j)| (node as usize, j)).collect()
+    }
+
+    /// Leaves Σ gᵀ in `y`, with g the derivatives of a coordinate, in the columns that are `wanted`.
+    fn solve_for(&mut self, of: &Derivatives, coordinate: usize, given: &[Range<usize>], wanted: &[Range<usize>]) {
+        self.y.fill(0.0);
+        for ((_, matrix), columns) in of.iter().zip(given) {
+            for (y, g) in self.y[columns.clone()].iter_mut().zip(matrix.row(coordinate).iter()) {
+                *y += g;
+            }
+        }
+        self.solver.linear.solve_part(&mut self.y, given, wanted);
     }
 
     /// Gives the solver back.
@@ -104,7 +156,15 @@ pub(crate) fn factorize(graph: &Graph, solver: &mut Solver) -> Result<(), Error>
     Ok(())
 }
 
-fn columns(layout: &Layout, of: &[(u32, DMatrix<f64>)]) -> Vec<Range<usize>> {
+/// Adds the product of derivatives and y.
+fn multiply(of: &Derivatives, columns: &[Range<usize>], y: &[f64], mut product: DVectorViewMut<'_, f64>) {
+    for ((_, matrix), columns) in of.iter().zip(columns) {
+        let part = DVectorView::from_slice(&y[columns.clone()], columns.len());
+        product.gemv(1.0, matrix, &part, 1.0);
+    }
+}
+
+fn columns(layout: &Layout, of: &Derivatives) -> Vec<Range<usize>> {
     of.iter()
         .map(|(node, matrix)| {
             let first = layout.column(*node);

@@ -72,6 +72,38 @@ fn twenty_thousand_readings_have_the_covariance_of_the_closed_form() {
 }
 
 #[test]
+fn parts_of_a_covariance_by_what_causes_them_add_up_and_are_those_of_the_closed_form() {
+    let mut graph = Graph::new();
+    let m = graph.free(Vector::<3>::zeros());
+    let of_m = graph.prior(m, &Vector::<3>::zeros(), &[Q.sqrt(), 1.0, 1.0]);
+    let (mut before, mut readings, mut nodes) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..300 {
+        let x = graph.free(Vector::<2>::zeros());
+        before.push(graph.prior(x, &Vector::<2>::zeros(), &[P.sqrt(), 1.0]));
+        readings.push(graph.factor(Offset, (x, m)).sigma(R.sqrt()).key);
+        nodes.push(x);
+    }
+    let sum = graph.derive(Sum, (nodes[7], m));
+    let groups = [vec![of_m], before, readings, Vec::new()];
+    let mut covariance = Covariance::new(&graph).unwrap();
+    let near = |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+    // Each of n readings of variance s = P + R errs by what was assumed of x and by itself.
+    let (s, n) = (P + R, 300.0);
+    let var_m = 1.0 / (1.0 / Q + n / s);
+    let parts = covariance.due_to(m, &groups);
+    for (part, expected) in
+        parts.iter().zip([var_m.powi(2) / Q, n * (var_m / s).powi(2) * P, n * (var_m / s).powi(2) * R])
+    {
+        near(part[(0, 0)], expected);
+    }
+    assert_eq!(parts[3].abs().max(), 0.0);
+    let whole = covariance.of(sum);
+    let parts = covariance.due_to(sum, &groups);
+    near(parts.iter().map(|part| part[(0, 0)]).sum(), whole[(0, 0)]);
+    assert_eq!(covariance.into_solver().linear_solver(), "batched Schur complement");
+}
+
+#[test]
 fn all_linear_solvers_give_the_same_blocks() {
     type Choice = fn(&Workspace) -> Box<dyn LinearSolver>;
     let choices: [Choice; 3] = [

@@ -1,7 +1,8 @@
 //! Where each camera of a learned rig is on what it is mounted on, in the units that people write down, and how well that is known.
 use super::report::{Calibration, length_in_words};
+use super::sources::Sources;
 use super::{deviations, gauge};
-use crate::rig::{Camera, Parameter, Parent, Rig};
+use crate::rig::{Camera, Parameter, Parent, Rig, matches};
 use handeye_solvers::manifold::so3;
 
 /// Of two standard deviations, the smaller is told too where it is below this share of the other.
@@ -21,9 +22,13 @@ pub struct CameraPose {
     /// Standard deviations of centre and rotation, length [m, or the model's unit] and angle [rad], with what is `assumed` taken as it is;
     /// `None` where the pose is held or left open.
     pub sd: Option<[f64; 2]>,
+    /// What the standard deviation of the centre comes from; `None` where that is not known.
+    pub sources: Option<Sources>,
     /// Paths of joints' numbers that place the frame of what it is mounted on along and about an axis. No image depends on them, so they are
     /// known from priors alone.
     pub assumed: Vec<String>,
+    /// What holds them, as few patterns of paths as may be: the joint as a whole where nothing else of it was learned.
+    pub hold: Vec<String>,
     /// The same standard deviations with those of the priors of what is `assumed`; those of `sd` where nothing is.
     pub sd_with_assumed: Option<[f64; 2]>,
     /// True where lengths are metres.
@@ -39,15 +44,18 @@ pub fn camera_poses(calibration: &Calibration) -> Vec<CameraPose> {
         let size = |sds: &[f64]| sds.iter().map(|sd| sd * sd).sum::<f64>().sqrt();
         let whole = sds.filter(|sds| sds.len() == 6).map(|sds| [size(&sds[..3]), size(&sds[3..])]);
         let is_less = |less: &[f64; 2], whole: [f64; 2]| less[0] > 0.0 && (0..2).any(|k| less[k] < ALIKE * whole[k]);
-        let less =
-            report.camera_poses.get(index).copied().filter(|less| whole.is_some_and(|whole| is_less(less, whole)));
-        let assumed = if less.is_some() { of_frame(rig, camera.parent) } else { Vec::new() };
+        let against_arm = report.camera_poses.get(index).filter(|_| whole.is_some());
+        let sd = against_arm.map(|of| [of.length, of.angle]).or(whole);
+        let is_less = sd.zip(whole).is_some_and(|(sd, whole)| is_less(&sd, whole));
+        let assumed = if is_less { of_frame(rig, camera.parent) } else { Vec::new() };
         Some(CameraPose {
             camera: camera.name.clone(),
             on: mount(rig, camera.parent),
             xyz: pose.translation.into(),
             turn: so3::log(&pose.rotation).into(),
-            sd: less.or(whole),
+            sd,
+            sources: against_arm.map(|of| of.sources),
+            hold: patterns(rig, &assumed),
             assumed,
             sd_with_assumed: whole,
             metric: report.metric,
@@ -56,9 +64,52 @@ pub fn camera_poses(calibration: &Calibration) -> Vec<CameraPose> {
     rig.cameras.iter().enumerate().filter_map(of_camera).collect()
 }
 
-/// The same in words, one sentence or two each.
+/// The same in words, one sentence each, and then what is assumed of them: of all at once where that is the same.
 pub fn camera_poses_in_words(calibration: &Calibration) -> Vec<String> {
-    camera_poses(calibration).iter().map(CameraPose::to_string).collect()
+    let poses = camera_poses(calibration);
+    let mut words: Vec<String> = poses.iter().map(CameraPose::in_short).collect();
+    if poses.iter().any(|pose| pose.sd.is_some()) {
+        words.push("± is one standard deviation; the squares of what it comes from add up to its square".to_owned());
+    }
+    let mut told: Vec<&[String]> = Vec::new();
+    for pose in poses.iter().filter(|pose| !pose.assumed.is_empty()) {
+        if !told.contains(&&pose.assumed[..]) {
+            told.push(&pose.assumed);
+            let alike: Vec<&CameraPose> = poses.iter().filter(|other| other.assumed == pose.assumed).collect();
+            words.extend(assumed_in_words(&alike));
+        }
+    }
+    words
+}
+
+/// What is assumed of poses, the same of all of them, and what to do about it; `None` where nothing is.
+fn assumed_in_words(poses: &[&CameraPose]) -> Option<String> {
+    let first = poses.first().filter(|pose| !pose.assumed.is_empty())?;
+    let known = |pose: &&CameraPose| {
+        let [length, angle] = pose.sd_in_words(pose.sd_with_assumed?);
+        let of = if poses.len() > 1 { format!(" (`{}`)", pose.camera) } else { String::new() };
+        Some(format!("{length} and {angle}{of}"))
+    };
+    let known: Vec<String> = poses.iter().filter_map(known).collect();
+    let (takes, is_known) =
+        if poses.len() > 1 { ("These take", "the poses are") } else { ("This takes", "the pose is") };
+    let (they_are, them) = if first.assumed.len() > 1 { ("they are", "them") } else { ("it is", "it") };
+    let quoted: Vec<String> = first.hold.iter().map(|path| format!("\"{path}\"")).collect();
+    Some(format!(
+        "{takes} {} as given, since no image shows {them}; as uncertain as {they_are} assumed to be, {is_known} known to {}. Where {they_are} as in \
+         the data sheet, hold {them}: `--hold {}`, or `fixed = [{}]` under `[estimate]` of a rig file",
+        first.assumed.join(", "),
+        known.join(", "),
+        first.hold.join(","),
+        quoted.join(", ")
+    ))
+}
+
+/// Patterns that cover these numbers of one joint and no others that were learned.
+fn patterns(rig: &Rig, assumed: &[String]) -> Vec<String> {
+    let Some((joint, _)) = assumed.first().and_then(|path| path.rsplit_once('.')) else { return Vec::new() };
+    let mut learned = rig.fit.iter().flat_map(|fit| fit.sd.keys()).filter(|path| matches(joint, path));
+    if learned.all(|path| assumed.contains(path)) { vec![joint.to_owned()] } else { assumed.to_vec() }
 }
 
 /// What a camera's pose is against.
@@ -105,6 +156,17 @@ impl CameraPose {
         format!("{}°", self.turn.map(|angle| format!("{:.2}", angle.to_degrees())).join(", "))
     }
 
+    /// Without what is assumed.
+    fn in_short(&self) -> String {
+        let unit = if self.metric { "" } else { ", in the model's unit" };
+        let [length, angle] =
+            self.sd.map_or([String::new(), String::new()], |sd| self.sd_in_words(sd).map(|sd| format!(", {sd}")));
+        let parts = self.sources.map_or_else(String::new, |sources| sources.in_words(self.metric, true));
+        let parts = if parts.is_empty() { parts } else { format!(" ({parts})") };
+        let (camera, on, centre, turn) = (&self.camera, &self.on, self.centre_in_words(), self.turn_in_words());
+        format!("camera `{camera}`: {centre} from {on}{unit}{length}{parts}; turned by {turn} (rotation vector){angle}")
+    }
+
     /// A standard deviation of the centre, and one of the rotation.
     pub fn sd_in_words(&self, [length, angle]: [f64; 2]) -> [String; 2] {
         [format!("± {}", length_in_words(length, self.metric)), format!("± {:.3}°", angle.to_degrees())]
@@ -113,26 +175,7 @@ impl CameraPose {
 
 impl std::fmt::Display for CameraPose {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let CameraPose { camera, on, assumed, .. } = self;
-        let unit = if self.metric { "" } else { ", in the model's unit" };
-        let [length, angle] =
-            self.sd.map_or([String::new(), String::new()], |sd| self.sd_in_words(sd).map(|sd| format!(", {sd}")));
-        write!(f, "camera `{camera}`: {} from {on}{unit}{length}; ", self.centre_in_words())?;
-        write!(f, "turned by {} (rotation vector){angle}", self.turn_in_words())?;
-        if self.sd.is_some() {
-            write!(f, "; ± is one standard deviation")?;
-        }
-        let Some(whole) = self.sd_with_assumed.filter(|_| !assumed.is_empty()) else { return Ok(()) };
-        let [length, angle] = self.sd_in_words(whole);
-        let quoted: Vec<String> = assumed.iter().map(|path| format!("\"{path}\"")).collect();
-        let (they_are, them) = if assumed.len() > 1 { ("they are", "them") } else { ("it is", "it") };
-        write!(
-            f,
-            ". This takes {} as given, since no image shows {them}; as uncertain as {they_are} assumed to be, the pose is known to {length} and \
-             {angle}. Where {they_are} as in the data sheet, hold {them}: `--hold {}`, or `fixed = [{}]` under `[estimate]` of a rig file",
-            assumed.join(", "),
-            assumed.join(","),
-            quoted.join(", ")
-        )
+        f.write_str(&self.in_short())?;
+        assumed_in_words(&[self]).map_or(Ok(()), |assumed| write!(f, ". {assumed}"))
     }
 }

@@ -1,19 +1,19 @@
 //! How well the learned numbers are determined: standard deviations, the tip's in metres, and what only a prior decides.
-use super::direction::Direction;
-use super::evaluate::median;
 use super::graph::{Built, Freedom, Priors, build, row};
 use super::observation::Kind;
 use super::outliers::Verdict;
 use super::residuals::whitened;
 use super::setup::Setup;
+use super::sources::{self, Sources};
 use super::stage::{Stage, Stages};
 use super::weak::Combination;
-use super::{TipDeviation, gauge, lengths, poorly, variances};
+use super::{PoseDeviation, TipDeviation, gauge, lengths, poorly, variances};
 use crate::calibrate::graph::State;
 use crate::factors::ForwardKinematics;
 use crate::rig::{CameraField, JointField, Parameter};
 use handeye_solvers::{Covariance, DynamicVector, Key, Loss, Pose, Solver, WeakDirection};
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Standard deviations of what was learned.
@@ -23,11 +23,15 @@ pub(crate) struct Deviations {
     pub by_path: BTreeMap<String, Vec<f64>>,
     /// Over the recorded samples; `None` where the data leave something open.
     pub tip: Option<TipDeviation>,
-    /// Of every camera's pose against the arm, length [m] and angle [rad]; empty where the tip's is not known.
-    pub cameras: Vec<[f64; 2]>,
+    /// Of every camera's pose against the arm; empty where the tip's is not known.
+    pub cameras: Vec<PoseDeviation>,
     /// What nothing, or a prior more than the data, determines.
     pub weak: Vec<Combination>,
 }
+
+/// Coordinates of a pose's step.
+const ROTATION: Range<usize> = 0..3;
+const POSITION: Range<usize> = 3..6;
 
 /// Samples whose tip is looked at, spread evenly over the recording.
 const TIPS: usize = 200;
@@ -129,58 +133,44 @@ fn against_arm(
     freedom: &Freedom,
     state: &State,
     verdict: &Verdict,
-) -> Option<(TipDeviation, Vec<[f64; 2]>)> {
+) -> Option<(TipDeviation, Vec<PoseDeviation>)> {
     let freedom = gauge::with_frames_held(&honest.setup, freedom);
     if !gauge::is_tip_learned(&honest.setup, &freedom) {
         return None;
     }
     let mut built = honest.build(&freedom, state, verdict);
-    let (samples, tips) = tips_at_held_joints(&mut built, state);
-    let mut solver = Solver::new(&built.graph);
-    let weak = WeakDirection::find(&built.graph, &mut solver, Some(&built.states())).ok()?;
-    let mut covariance = Covariance::with(&built.graph, solver).ok()?;
-    // Directions found are uncorrelated, so that their shares of a variance add up.
-    let direction = |weak| Direction::of_weak(honest, &built, weak);
-    let shares: Vec<Vec<f64>> =
-        weak.iter().filter_map(|weak| direction(weak).tip_motion(honest, state, &built, &samples)).collect();
-    let (mut sds, mut by_data) = (Vec::new(), Vec::new());
-    for (index, &tip) in tips.iter().enumerate() {
-        let block = covariance.of(tip);
-        let variance = (block[(3, 3)] + block[(4, 4)] + block[(5, 5)]).max(0.0);
-        let of_priors: f64 = shares.iter().map(|share| share[index].powi(2)).sum();
-        sds.push(variance.sqrt());
-        by_data.push((variance - of_priors).max(0.0).sqrt());
+    let tips = tips_at_held_joints(&mut built, state);
+    let mut covariance = Covariance::new(&built.graph).ok()?;
+    let mut of_samples: Vec<Sources> = Vec::new();
+    for tip in tips {
+        let [position, _] = sources::of_pose(&built, &mut covariance, tip, [POSITION, ROTATION]);
+        of_samples.push(position);
     }
-    let mut pose = |key: Key<Pose>| {
-        let block = covariance.of(key);
-        let size = |first: usize| (first..first + 3).map(|i| block[(i, i)].max(0.0)).sum::<f64>().sqrt();
-        [size(3), size(0)]
+    of_samples.sort_by(|one, other| one.whole().total_cmp(&other.whole()));
+    let sources = *of_samples.get(of_samples.len() / 2)?;
+    let largest = of_samples.last()?.whole();
+    let metric = gauge::length_is_known(&honest.setup);
+    let tip = TipDeviation { median: sources.whole(), largest, by_data: sources.data, sources, metric };
+    let pose = |(key, _): &(Key<Pose>, _)| {
+        let [sources, angle] = sources::of_pose(&built, &mut covariance, *key, [POSITION, ROTATION]);
+        PoseDeviation { length: sources.whole(), angle: angle.whole(), sources }
     };
-    let cameras = built.cameras.iter().map(|(key, _)| pose(*key)).collect();
-    let largest = sds.iter().copied().reduce(f64::max)?;
-    let tip = TipDeviation {
-        median: median(&mut sds),
-        largest,
-        by_data: median(&mut by_data),
-        metric: gauge::length_is_known(&honest.setup),
-    };
+    let cameras = built.cameras.iter().map(pose).collect();
     Some((tip, cameras))
 }
 
-/// Derived tips of samples, spread evenly over the recording, and which samples these are.
-fn tips_at_held_joints(built: &mut Built, state: &State) -> (Vec<usize>, Vec<Key<Pose>>) {
+/// Derived tips of samples, spread evenly over the recording.
+fn tips_at_held_joints(built: &mut Built, state: &State) -> Vec<Key<Pose>> {
     let in_use = |&sample: &usize| state.placed[sample] && built.joints[sample].is_some();
     let samples: Vec<usize> = (0..state.joints.len()).filter(in_use).collect();
     let every = samples.len().div_ceil(TIPS).max(1);
-    let samples: Vec<usize> = samples.into_iter().step_by(every).collect();
     let chain = Arc::new(state.model.chain.clone());
-    let tips = samples.iter().map(|&sample| {
+    let tips = samples.into_iter().step_by(every).map(|sample| {
         let joints = built.graph.held(DynamicVector::from_column_slice(&state.joints[sample]));
         let tip = ForwardKinematics { chain: chain.clone(), upto: chain.len() };
         built.graph.derive(tip, (built.base, built.parameters, joints))
     });
-    let tips = tips.collect();
-    (samples, tips)
+    tips.collect()
 }
 
 /// Standard deviations of everything that is free; poses as translation, then rotation vector.

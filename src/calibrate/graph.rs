@@ -110,6 +110,8 @@ pub(crate) struct Built {
     pub tool: Key<Pose>,
     /// The factor of each observation that takes part.
     pub factors: Vec<(usize, FactorKey)>,
+    /// Factors of what is known beside the recording: of the robot, the cameras, the features, and lengths that were measured.
+    pub known: [Vec<FactorKey>; 4],
 }
 
 impl Freedom {
@@ -222,34 +224,37 @@ impl Built {
         let n = state.tips.len();
         let tool = graph.free(state.tool);
         let (tips, joints, factors) = (vec![None; n], vec![None; n], Vec::new());
-        Built { graph, base, parameters, cameras, features, tips, joints, tool, factors }
+        let known = Default::default();
+        Built { graph, base, parameters, cameras, features, tips, joints, tool, factors, known }
     }
 
     fn add_priors(&mut self, priors: &Priors, freedom: &Freedom) {
         let graph = &mut self.graph;
+        let [of_robot, of_cameras, of_features, _] = &mut self.known;
         let some = |sigmas: &[f64]| sigmas.iter().any(|sigma| sigma.is_finite());
         if freedom.source == Tips::Chain {
             if some(&priors.base) {
-                graph.prior(self.base, &priors.mean.base, &priors.base);
+                of_robot.push(graph.prior(self.base, &priors.mean.base, &priors.base));
             }
             if some(&priors.parameters) {
                 let mean = DynamicVector::from_column_slice(&priors.mean.parameters);
-                graph.prior(self.parameters, &mean, &priors.parameters);
+                of_robot.push(graph.prior(self.parameters, &mean, &priors.parameters));
             }
         }
         for (index, &(pose, intrinsics)) in self.cameras.iter().enumerate() {
             let mean = &priors.mean.cameras[index];
             // Without the chain, the world is not yet where the given poses are.
             if freedom.source != Tips::Seen && some(&priors.cameras[index]) {
-                graph.prior(pose, &mean.pose, &priors.cameras[index]);
+                of_cameras.push(graph.prior(pose, &mean.pose, &priors.cameras[index]));
             }
             if some(&priors.intrinsics[index]) {
-                graph.prior(intrinsics, &Intrinsics::from(mean.intrinsics), &priors.intrinsics[index]);
+                let mean = Intrinsics::from(mean.intrinsics);
+                of_cameras.push(graph.prior(intrinsics, &mean, &priors.intrinsics[index]));
             }
         }
         for (index, &feature) in self.features.iter().enumerate() {
             if freedom.source != Tips::Seen && some(&priors.features[index]) {
-                graph.prior(feature, &priors.mean.features[index].xyz, &priors.features[index]);
+                of_features.push(graph.prior(feature, &priors.mean.features[index].xyz, &priors.features[index]));
             }
         }
     }

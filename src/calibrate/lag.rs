@@ -3,11 +3,8 @@
 //! What stands still looks the same at any lag, and may be most of a recording. So a lag is judged by the samples in which the robot is fastest.
 use super::evaluate::{distances, median};
 use super::{Distance, Distances, Finding};
-use crate::recording::{Recording, Sample};
+use crate::recording::{Readings, Recording, Sample};
 use crate::rig::Rig;
-
-/// Samples are dense where the median step of a joint is below this share of its range.
-const DENSE: f64 = 0.15;
 
 /// Lags are tried up to so many sample periods, in steps of so much of one; around the best of them in finer ones.
 const PERIODS: f64 = 5.0;
@@ -52,10 +49,10 @@ pub(crate) fn in_words(seconds: f64) -> [String; 2] {
     let (side, to) = if seconds > 0.0 { ("late", "subtract") } else { ("early", "add") };
     let stamps = if seconds > 0.0 { "from the stamps" } else { "to the stamps" };
     // A sum with zero is never negative zero.
-    let delay = format!("--joint-delay {:.3}", 0.0 - seconds);
+    let delay = format!("`--joint-delay {:.3}`", 0.0 - seconds);
     [
         format!("joints are stamped {by:.3} s too {side}"),
-        format!("{to} {by:.3} s {stamps} of the joints; a bag is read so with {delay}"),
+        format!("{to} {by:.3} s {stamps} of the joints, as {delay} does"),
     ]
 }
 
@@ -88,7 +85,7 @@ pub(crate) struct Motion<'a> {
 impl<'a> Motion<'a> {
     /// `None` where samples are not dense in time.
     pub fn new(recording: &'a Recording) -> Option<Self> {
-        let period = period(recording)?;
+        let period = recording.dense_period()?;
         let fastest = fastest(recording)?;
         Some(Motion { recording, period, fastest })
     }
@@ -117,28 +114,6 @@ impl<'a> Motion<'a> {
     }
 }
 
-/// Times [s] and joints of the samples that have both.
-fn rows(recording: &Recording) -> Vec<(f64, &Vec<f64>)> {
-    recording.samples.iter().filter_map(|sample| Some((sample.time?, sample.joints.as_ref()?))).collect()
-}
-
-/// Median time between samples [s], where joints change little over it.
-fn period(recording: &Recording) -> Option<f64> {
-    let rows = rows(recording);
-    if rows.len() < 10 || rows.len() < recording.samples.len() / 2 {
-        return None;
-    }
-    let median = |mut values: Vec<f64>| median(&mut values);
-    let dense = |joint: usize| {
-        let readings = || rows.iter().map(|(_, joints)| joints[joint]);
-        let range = readings().fold(f64::NEG_INFINITY, f64::max) - readings().fold(f64::INFINITY, f64::min);
-        let steps = rows.windows(2).map(|pair| (pair[1].1[joint] - pair[0].1[joint]).abs()).collect();
-        median(steps) <= DENSE * range
-    };
-    let period = median(rows.windows(2).map(|pair| pair[1].0 - pair[0].0).collect());
-    (period > 0.0 && (0..recording.joints.len()).all(dense)).then_some(period)
-}
-
 /// The samples in which joints go fastest, from the sample before to the one after.
 fn fastest(recording: &Recording) -> Option<Recording> {
     let samples = &recording.samples;
@@ -160,22 +135,11 @@ fn fastest(recording: &Recording) -> Option<Recording> {
     (!kept.is_empty()).then(|| recording.select(|index| kept.binary_search(&index).is_ok()))
 }
 
-/// `some` of the recording's samples with the joints that were stamped `lag` [s] later than each image, linear between all stamps; samples without
-/// such are left out.
+/// `some` of the recording's samples with the joints that were stamped `lag` [s] later than each image; samples without such are left out.
 pub(crate) fn interpolated(recording: &Recording, some: &Recording, lag: f64) -> Recording {
-    let rows = rows(recording);
-    let at = |time: f64| -> Option<Vec<f64>> {
-        let after = rows.partition_point(|(stamp, _)| *stamp < time);
-        let (next, joints) = rows.get(after)?;
-        if *next == time {
-            return Some((*joints).clone());
-        }
-        let (before, from) = rows.get(after.checked_sub(1)?)?;
-        let share = (time - before) / (next - before);
-        Some(from.iter().zip(*joints).map(|(a, b)| a + share * (b - a)).collect())
-    };
+    let readings = Readings::new(recording);
     let samples = some.samples.iter().filter_map(|sample| {
-        let joints = at(sample.time? + lag)?;
+        let joints = readings.at(sample.time? + lag)?.joints?;
         Some(Sample { joints: Some(joints), ..sample.clone() })
     });
     Recording { samples: samples.collect(), ..some.clone() }

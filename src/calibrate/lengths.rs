@@ -119,16 +119,18 @@ pub(crate) fn scale(setup: &Setup, state: &State) -> Option<f64> {
 /// Adds a factor for each.
 pub(crate) fn measure(setup: &Setup, loss: Loss, built: &mut Built) {
     for &(Length { length, sd, .. }, found) in &setup.lengths {
-        match found {
+        let graph = &mut built.graph;
+        let key = match found {
             Found::Features([one, other]) => {
                 let on = (built.features[one], built.features[other]);
-                built.graph.factor(PointDistance { length }, on).sigma(sd).loss(loss);
+                graph.factor(PointDistance { length }, on).sigma(sd).loss(loss).key
             }
             Found::Cameras([one, other]) => {
                 let on = (built.cameras[one].0, built.cameras[other].0);
-                built.graph.factor(OriginDistance { length }, on).sigma(sd).loss(loss);
+                graph.factor(OriginDistance { length }, on).sigma(sd).loss(loss).key
             }
-        }
+        };
+        built.known[3].push(key);
     }
 }
 

@@ -1,7 +1,7 @@
 //! The free numbers of a rig in one order, and their covariance.
 use super::graph::{Built, Freedom, row};
 use crate::factors::Intrinsics;
-use handeye_solvers::{Covariance, DynamicVector, Key, Pose, Vector};
+use handeye_solvers::{Covariance, DynamicVector, FactorKey, Key, Pose, Vector};
 use nalgebra::DMatrix;
 
 /// What of a rig a number belongs to.
@@ -63,6 +63,20 @@ impl Numbers {
     pub fn columns(&self, part: Part) -> impl Iterator<Item = (usize, usize)> {
         let block = self.blocks.iter().find(|block| block.part == part);
         block.into_iter().flat_map(|block| block.free.iter().enumerate().map(|(i, &k)| (k, block.first + i)))
+    }
+
+    /// Whitened derivatives of a factor by all of them.
+    pub fn jacobian(&self, built: &Built, covariance: &Covariance<'_>, factor: FactorKey) -> DMatrix<f64> {
+        let of_nodes = covariance.jacobian(factor);
+        let rows = of_nodes.first().map_or(0, |(_, j)| j.nrows());
+        let mut jacobian = DMatrix::zeros(rows, self.len);
+        for block in &self.blocks {
+            let node = block.part.node(built);
+            if let Some((_, j)) = of_nodes.iter().find(|(of, _)| *of == node) {
+                jacobian.columns_mut(block.first, j.ncols()).copy_from(j);
+            }
+        }
+        jacobian
     }
 
     /// Covariance of all of them.

@@ -1,5 +1,6 @@
 //! What a calibration did and found, and how good it is.
 use super::lag::in_words as lag_in_words;
+use super::sources::Sources;
 use super::{CameraErrors, Combination, Influence, PointErrors, TargetReport};
 use crate::rig::{Length, Noise, Rig};
 
@@ -47,9 +48,9 @@ pub struct Report {
     pub findings: Vec<Finding>,
     /// Standard deviation of the tip over the recorded workspace; `None` where the data leave the rig open.
     pub tip: Option<TipDeviation>,
-    /// Standard deviations of the pose of every camera of the learned rig against the arm: length [m, or the model's unit] and angle [rad]. Where
-    /// the base's frame lies against the first axis, which nothing that is seen depends on, is no part of them. Empty where the tip has none.
-    pub camera_poses: Vec<[f64; 2]>,
+    /// Standard deviations of the pose of every camera of the learned rig against the arm. Where the base's frame lies against the first axis,
+    /// which nothing that is seen depends on, is no part of them. Empty where the tip has none.
+    pub camera_poses: Vec<PoseDeviation>,
     /// Combinations of numbers that nothing, or a prior more than the data, determines; those that move a camera against what it is mounted on
     /// first, then those that move the tip, then the others.
     pub weak: Vec<Combination>,
@@ -108,7 +109,7 @@ pub enum Finding {
         /// Path, given and learned value [m, rad], and standard deviations between them.
         values: Vec<(String, [f64; 2], f64)>,
     },
-    /// Single detections were left out.
+    /// Single detections were left out, in images of which the others fit.
     Outliers {
         /// How many.
         count: usize,
@@ -189,7 +190,7 @@ impl Finding {
                     named.join(", ")
                 )
             }
-            Finding::Outliers { count, of } => format!("{count} of {of} detections do not fit"),
+            Finding::Outliers { count, of } => format!("{count} single detections of {of} do not fit"),
             Finding::WrongJoints { sample, off, swapped_with, by_pose } => {
                 let (leads, fits) = if *by_pose { ("tip pose does", "it fits") } else { ("joints do", "they fit") };
                 let swapped =
@@ -291,15 +292,16 @@ pub struct TipDeviation {
     pub median: f64,
     /// Largest over the samples.
     pub largest: f64,
-    /// Median of what is left where everything is known that a prior determines more than the data do: what the data alone
-    /// answer for.
+    /// What errors of the recording alone account for, of the median.
     pub by_data: f64,
+    /// What errors of each kind account for, of the median.
+    pub sources: Sources,
     /// True where it is in metres; false where nothing metric is known and it is in the model's unit.
     pub metric: bool,
 }
 
 impl TipDeviation {
-    /// True where priors decide a good part of it, so that two figures are needed to tell what is known.
+    /// True where what is known beside the recording decides a good part of it, so that two figures are needed to tell what is known.
     pub fn hangs_on_priors(&self) -> bool {
         self.by_data < 0.9 * self.median
     }
@@ -313,18 +315,28 @@ impl TipDeviation {
 impl std::fmt::Display for TipDeviation {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let [median, largest, by_data] = [self.median, self.largest, self.by_data].map(|length| self.length(length));
-        if self.hangs_on_priors() {
-            write!(f, "{by_data} by the data, and to {median} (largest {largest}) with what only priors determine")?;
-            write!(f, " (median standard deviations over the samples")?;
-        } else {
-            write!(f, "{median} (median standard deviation over the samples; largest {largest}")?;
+        let unit = if self.metric { "" } else { "; nothing metric is known, so in the model's unit" };
+        if !self.hangs_on_priors() {
+            return write!(f, "{median} (median standard deviation over the samples; largest {largest}{unit})");
         }
-        write!(f, "{})", if self.metric { "" } else { "; nothing metric is known, so in the model's unit" })?;
-        if self.hangs_on_priors() {
-            write!(f, "; they differ because what the data do not tell comes only from what was assumed of the rig")?;
-        }
-        Ok(())
+        let known = self.sources.in_words(self.metric, false);
+        write!(
+            f,
+            "{by_data} by the data, and to {median} (largest {largest}) with what was given and measured besides: {known} "
+        )?;
+        write!(f, "(median standard deviations over the samples, whose squares add up{unit})")
     }
+}
+
+/// Standard deviations of the pose of a camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseDeviation {
+    /// Of its centre [m, or the model's unit]: the root of the trace of the covariance.
+    pub length: f64,
+    /// Of its rotation [rad], likewise.
+    pub angle: f64,
+    /// What errors of each kind account for, of `length`.
+    pub sources: Sources,
 }
 
 /// A length with its unit, or as a bare number where nothing metric is known.

@@ -48,6 +48,11 @@ pub enum DeterminedBy {
     },
 }
 
+/// How many times as well, in words.
+pub(crate) fn times(ratio: f64) -> String {
+    if ratio < 10.0 { format!("{ratio:.1} times") } else { format!("{ratio:.0} times") }
+}
+
 /// Combinations that are put in words.
 const DIRECTIONS: usize = 6;
 
@@ -128,13 +133,15 @@ impl std::fmt::Display for Combination {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.determined_by {
             DeterminedBy::Nothing => write!(f, "nothing determines ")?,
-            DeterminedBy::Prior(ratio) if ratio > 1e3 => write!(f, "only a prior determines ")?,
+            DeterminedBy::Prior(ratio) if ratio > 1e3 => write!(f, "only what is given determines ")?,
             DeterminedBy::Poorly { sd, share, metric } => {
                 let length = if metric { format!("{:.1} mm, ", 1e3 * sd) } else { String::new() };
                 write!(f, "ill-posed: the data determine only to {length}{:.1} % of the distance ", 1e2 * share)?;
                 write!(f, "between cameras and features (one standard deviation) ")?;
             }
-            DeterminedBy::Prior(ratio) => write!(f, "a prior more than the data ({ratio:.1} to 1) determines ")?,
+            DeterminedBy::Prior(ratio) => {
+                write!(f, "what is given determines, {} as well as the data, ", times(ratio))?
+            }
         }
         f.write_str(&self.moves)?;
         let matters = self.matters();

@@ -13,7 +13,7 @@ use clap::Args;
 use handeye::Error;
 use handeye::calibrate::{
     Calibration, CameraPose, Distance, Errors, Finding, NoiseTrial, Options, OverstatedNoise, Progress, Report,
-    TargetReport, assumptions, calibrate, camera_poses, camera_poses_in_words, findings_in_words, hold,
+    Sources, TargetReport, assumptions, calibrate, camera_poses, camera_poses_in_words, findings_in_words, hold,
     overstated_noise, relearn, select_noise,
 };
 use handeye::recording::Recording;
@@ -182,7 +182,11 @@ impl Calibrate {
         if report.converged {
             learned.write(&self.output, text.as_deref())?;
             answer.json["learned"] = json!(output.to_string());
+            let is_lag = |finding: &Finding| matches!(finding, Finding::Lag { .. });
             answer.text += &match report.targets {
+                None if report.findings.iter().any(is_lag) => {
+                    "\nnext: mend the clocks, as the first line of what does not fit says, and calibrate again\n".to_owned()
+                }
                 None => format!("\nnext: handeye evaluate {output} FRESH.jsonl judges it on samples it has not seen\n"),
                 Some(_) => "\nnext: learn from a second recording too: the poses of both agree within a few of their standard deviations\n".into(),
             };
@@ -270,6 +274,12 @@ fn describe(before: &Rig, recording: &Recording, calibration: &Calibration, seco
     text + &trust::text(report, recording)
 }
 
+/// What errors of each kind account for.
+fn sources_json(sources: &Sources) -> Value {
+    let Sources { data, robot, cameras, features, lengths } = sources;
+    json!({ "data": data, "robot": robot, "cameras": cameras, "features": features, "lengths": lengths })
+}
+
 fn camera_pose_json(pose: &CameraPose) -> Value {
     json!({
         "camera": pose.camera,
@@ -277,6 +287,7 @@ fn camera_pose_json(pose: &CameraPose) -> Value {
         "xyz": pose.xyz,
         "rotation_vector": pose.turn,
         "sd": pose.sd,
+        "sources": pose.sources.as_ref().map(sources_json),
         "assumed": pose.assumed,
         "sd_with_assumed": pose.sd_with_assumed,
         "metric": pose.metric,
@@ -355,7 +366,8 @@ pub fn report_json(report: &Report, recording: &Recording) -> Value {
         "noise": report.noise.as_ref().map(noise::json),
         "findings": report.findings.iter().map(|one| finding_json(one, one.to_string())).collect::<Vec<_>>(),
         "tip_sd": report.tip.map(|tip| json!({
-            "median": tip.median, "largest": tip.largest, "by_data": tip.by_data, "metric": tip.metric
+            "median": tip.median, "largest": tip.largest, "by_data": tip.by_data, "metric": tip.metric,
+            "sources": sources_json(&tip.sources),
         })),
         "targets": report.targets.as_ref().map(targets_json),
         "tip_sd_mm": metric.map(|tip| 1e3 * tip.median),

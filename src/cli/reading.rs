@@ -26,6 +26,9 @@ pub struct OfFiles {
     /// Take one sample of each standstill of the robot, and none of its motions
     #[arg(long)]
     still: bool,
+    /// Add this to the stamps of the robot's readings, whose clock is that far behind the cameras' [s]
+    #[arg(long, value_name = "SECONDS", value_parser = finite, allow_negative_numbers = true)]
+    joint_delay: Option<f64>,
     #[command(flatten)]
     bag: OfBags,
     #[command(flatten)]
@@ -48,12 +51,13 @@ impl Reading {
 
     /// What they say of the files that are read. Errors: for those that are nothing to any of the files.
     pub fn options(&self, files: &[&Path]) -> Result<OpenOptions, Error> {
-        let OfFiles { joints, camera, still, bag, table } = &self.of_files;
+        let OfFiles { joints, camera, still, joint_delay, bag, table } = &self.of_files;
         let options = OpenOptions {
             joints: joints.clone(),
             known_joints: Vec::new(),
             cameras: camera.iter().map(|text| read_camera(text)).collect::<Result<_, _>>()?,
             still: *still,
+            joint_delay: *joint_delay,
             bag: bag.options(),
             table: TableOptions {
                 angles: table.angles(),
@@ -108,9 +112,6 @@ pub struct OfBags {
     /// Images at most this far apart make one sample [s] [default: half the time between two images, unless the robot moved between them]
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     join: Option<f64>,
-    /// Add this to the stamps of joint states, tip poses and TF, whose clock is that far behind the cameras' [s]
-    #[arg(long, value_name = "SECONDS", value_parser = finite, allow_negative_numbers = true)]
-    joint_delay: Option<f64>,
 }
 
 #[derive(Args, Clone, Default)]
@@ -153,7 +154,6 @@ impl OfBags {
             frames: self.base_frame.clone().zip(self.tip_frame.clone()).map(|(base, tip)| [base, tip]),
             camera_topics: self.camera_topic.iter().map(camera).collect(),
             join: self.join,
-            joint_delay: self.joint_delay,
         }
     }
 }

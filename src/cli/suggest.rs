@@ -142,7 +142,7 @@ fn text(rig: &Rig, suggestion: &Suggestion) -> String {
     );
     if suggestion.with_priors > 1.1 * suggestion.now {
         text += &format!(
-            "\nwith what only priors determine, the tip is known to {}, which more motions hardly change\n",
+            "\nwith what is given beside the data, the tip is known to {}, which more motions hardly change\n",
             length(suggestion.with_priors)
         );
     }

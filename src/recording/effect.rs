@@ -15,14 +15,14 @@ impl OpenOptions {
     pub fn without_effect(&self, formats: &[Format]) -> Option<WithoutEffect> {
         let has_bag = formats.contains(&Format::Bag);
         let has_table = formats.iter().any(|format| matches!(format, Format::Csv | Format::Parquet | Format::LeRobot));
-        let of_any = [("joints", !self.joints.is_empty()), ("still", self.still)];
+        let of_any =
+            [("joints", !self.joints.is_empty()), ("still", self.still), ("joint_delay", self.joint_delay.is_some())];
         let of_bags = [
             ("joint_topic", self.bag.joint_topic.is_some()),
             ("pose_topic", self.bag.pose_topic.is_some()),
             ("frames", self.bag.frames.is_some()),
             ("camera_topics", !self.bag.camera_topics.is_empty()),
             ("join", self.bag.join.is_some()),
-            ("joint_delay", self.bag.joint_delay.is_some()),
         ];
         let of_tables = [
             ("degrees", matches!(self.table.angles, Angles::Degrees(_))),

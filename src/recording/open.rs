@@ -48,6 +48,9 @@ pub struct OpenOptions {
     pub known_joints: Vec<String>,
     /// What is known of cameras, by name: a lens replaces what the file says of it, a size has to be that of the images, or of the CameraInfo.
     pub cameras: Vec<RecordedCamera>,
+    /// What is added to the stamps of the robot's readings before they are interpolated to the times of samples [s]; negative where they are stamped
+    /// too late. Of a bag these are joint states, tip poses and TF; of other files the joints and poses of the samples, which have to be dense.
+    pub joint_delay: Option<f64>,
     /// One sample of each standstill in place of all, see [`Recording::still`].
     pub still: bool,
     /// Of bags.
@@ -110,7 +113,10 @@ impl Opened {
 
 /// The same where cameras of which the options say something may be missing.
 fn open(path: &Path, options: &OpenOptions) -> Result<Opened, Error> {
-    open_whole(path, options)?.still(path, options)
+    let opened = open_whole(path, options)?;
+    // A bag's are stamped before they are interpolated to the times of images.
+    let opened = if Format::of(path) == Format::Bag { opened } else { opened.delayed(path, options)? };
+    opened.still(path, options)
 }
 
 /// The same with all samples.

@@ -22,9 +22,9 @@ const PAUSES: usize = 5;
 const REPEATED: f64 = 0.2;
 
 /// Where the robot was at a time [s], and the index of the sample.
-struct Moment {
-    time: f64,
-    state: Vec<f64>,
+pub(super) struct Moment {
+    pub time: f64,
+    pub state: Vec<f64>,
     index: usize,
 }
 
@@ -111,7 +111,7 @@ impl Recording {
     }
 
     /// Of the samples of which time and state are known.
-    fn moments(&self) -> Vec<Moment> {
+    pub(super) fn moments(&self) -> Vec<Moment> {
         let moment =
             |(index, sample): (usize, &Sample)| Some(Moment { time: sample.time?, state: state(self, sample)?, index });
         self.samples.iter().enumerate().filter_map(moment).collect()

@@ -6,7 +6,7 @@ use crate::Error;
 use crate::calibrate::{
     Calibration, Combination, DeterminedBy, Influence, SuggestOptions, SuggestedSample, Suggestion, TargetReport,
     camera_poses_in_words, combinations_in_words, findings_in_words, length_in_words, most_influential,
-    overstated_noise, suggest,
+    overstated_noise, suggest, times,
 };
 use crate::recording::Recording;
 use crate::rig::Rig;
@@ -51,7 +51,7 @@ const NUMBERS: usize = 200;
 /// Where to move next, for [`Subject::suggestion`]; `None` where that cannot be said, as for an arm of which no range is known. `before`: the
 /// rig that learning started from.
 pub fn suggestion(learned: &Rig, recording: &Recording, before: &Rig) -> Option<Suggestion> {
-    let options = SuggestOptions { count: SUGGESTED, ..SuggestOptions::default() };
+    let options = SuggestOptions { count: SUGGESTED, near: true, ..SuggestOptions::default() };
     suggest(learned, Some(recording), Some(before), &options).ok()
 }
 
@@ -97,7 +97,7 @@ fn summary(page: &mut Page, subject: &Subject<'_>) {
     if let Some(tip) = report.tip {
         if tip.hangs_on_priors() {
             figures.push((tip.length(tip.by_data), "standard deviation of the tip's position by the data alone"));
-            figures.push((tip.length(tip.median), "the same with what only priors determine"));
+            figures.push((tip.length(tip.median), "the same with what was given and measured besides"));
         } else {
             figures.push((tip.length(tip.median), "standard deviation of the tip's position"));
         }
@@ -151,9 +151,9 @@ fn combination(weak: &Combination) -> Folded {
     let by = match weak.determined_by {
         DeterminedBy::Nothing => "nothing determines this".to_owned(),
         DeterminedBy::Prior(ratio) if ratio.is_finite() => {
-            format!("its prior determines this {ratio:.0} times as well as the data")
+            format!("what is given determines this {} as well as the data", times(ratio))
         }
-        DeterminedBy::Prior(_) => "its prior alone determines this".to_owned(),
+        DeterminedBy::Prior(_) => "only what is given determines this".to_owned(),
         DeterminedBy::Poorly { .. } => "the data determine this, and poorly".to_owned(),
     };
     let matters = match weak.determined_by {
@@ -210,9 +210,9 @@ fn suggested(page: &mut Page, subject: &Subject<'_>) {
         )
     });
     page.paragraph(&format!(
-        "Joint positions that would shrink the uncertainty of the tip most, the most valuable first; obstacles are not known. Now it is known \
-         to {} by the data, and to {} with what only priors determine, in the median over the whole workspace of the arm{}. More motions \
-         shrink what the data leave, and hardly what comes from priors.",
+        "Joint positions near where the joints have been that would shrink the uncertainty of the tip most, the most valuable first; obstacles are \
+         not known (`handeye suggest` looks in the whole range, and keeps what `--above` says above the table). Now it is known to {} by the data, and to {} with what is given beside them, in the median over the whole workspace of the arm{}. More motions \
+         shrink what the data leave, and hardly what comes from what is given.",
         length(suggestion.now),
         length(suggestion.with_priors),
         of_samples.unwrap_or_default()

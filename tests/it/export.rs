@@ -100,7 +100,7 @@ fn export_writes_every_format_from_the_command_line() {
         ("export ur5 --to tf --camera left", "--camera is for"),
         ("export ur5 --to dh --urdf absent", "--urdf is for --to urdf"),
         ("export ur5 --to urdf", "--urdf"),
-        ("export ur5 --to dh --tip-frame tool0", "--base-frame and --tip-frame are for --to tf"),
+        ("export ur5 --to dh --tip-frame tool0", "--tip-frame and --camera-frame are for --to tf"),
         ("export ur5 --to urdf --urdf absent", "absent: "),
         ("export absent.toml --to tf", "absent.toml: "),
     ] {
@@ -122,6 +122,35 @@ fn frames_are_called_as_they_are_elsewhere_and_an_arm_that_was_learned_is_said_t
     assert!(ends.iter().all(|end| out.lines().any(|line| line.ends_with(end))) && !out.contains('#'), "{out}");
     let (out, _) = folder.expect(0, "export arm.toml --to tf --base-frame ur_base --tip-frame flange");
     assert!(out.contains("child_frame_id: \"ur_base\"") && out.contains("frame_id: \"flange\""), "{out}");
+    // The frame of a driver, with the optical one turned and 2 cm to its side.
+    let turned = so3::from_quaternion([-0.5, 0.5, -0.5, 0.5]);
+    let frame = "left=left_link,0.0,0.02,0.0,-0.5,0.5,-0.5,0.5";
+    let (out, _) = folder.expect(0, &format!("export arm.toml --to tf --camera-frame {frame}"));
+    let of_link = out.split("child_frame_id: \"left_link\"").nth(1).unwrap();
+    let numbers: Vec<f64> =
+        of_link.split(['{', '}', ',', ':']).filter_map(|word| word.trim().parse().ok()).take(7).collect();
+    let link = Pose {
+        rotation: so3::from_quaternion([numbers[3], numbers[4], numbers[5], numbers[6]]),
+        translation: Vector3::new(numbers[0], numbers[1], numbers[2]),
+    };
+    let camera = link * Pose { rotation: turned, translation: Vector3::new(0.0, 0.02, 0.0) };
+    let expected = rig.cameras[0].pose.unwrap();
+    assert!((camera.translation - expected.translation).norm() < 1e-12, "{out}");
+    assert!((camera.rotation - expected.rotation).amax() < 1e-12 && !out.contains("\"left\""), "{out}");
+    for (wrong, words) in [
+        ("top=link", "--camera-frame top: the cameras of the rig are left, right"),
+        ("left=link,1,2,3", "expected CAMERA=FRAME or CAMERA=FRAME,X,Y,Z,QX,QY,QZ,QW"),
+        ("left=link,0,0,0,0,0,0,2", "no quaternion of length 1"),
+    ] {
+        let (_, err) = folder.expect(2, &format!("export arm.toml --to tf --camera-frame {wrong}"));
+        assert!(err.contains(words), "{wrong}: {err}");
+    }
+    rig.cameras[0].name = "left_optical_frame".to_owned();
+    rig.write(&folder.path().join("named.toml"), None).unwrap();
+    let (_, err) = folder.expect(0, "export named.toml --to tf");
+    assert!(err.contains("`left_optical_frame` below a frame of its own, --camera-frame"), "{err}");
+    let (_, err) = folder.expect(0, "export named.toml --to tf --camera-frame left_optical_frame=left");
+    assert!(err.is_empty(), "{err}");
     rig.fit = Some(Fit { sd: [("robot.joints.elbow.a".to_owned(), vec![1e-4])].into(), ..Fit::default() });
     assert!(to_static_transforms(&rig).unwrap().starts_with("# of the arm as it was learned"));
     assert!(to_tf(&rig).unwrap().starts_with("# of the arm as it was learned"));

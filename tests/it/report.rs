@@ -43,7 +43,7 @@ fn a_page_has_every_section_stands_alone_and_holds_the_figures_of_the_command() 
     assert!(!page.contains("NaN") && !page.contains("src=") && !page.contains("<link"));
     let figure = format!("{:.3} px", json["rms_px"].as_f64().unwrap());
     assert!(page.contains(&figure), "{figure}");
-    assert!(page.contains("detections do not fit and were left out"));
+    assert!(page.contains(" do not fit and were left out"));
     for path in ["robot.joints.elbow.alpha", "cameras.left.pose", "features.f11.xyz"] {
         assert!(page.contains(&format!("<td>{path}</td>")), "{path}");
     }

@@ -46,9 +46,11 @@ fn the_pose_of_a_camera_stands_first_and_says_what_is_only_assumed_of_it() {
     assert!(sd < 0.5 * whole && turn < whole_turn, "{pose:?}");
     let centre = translation.map(|x| format!("{:.1}", 1e3 * x));
     let at = format!("{}, {}, {} mm", centre.x, centre.y, centre.z);
-    let fixed = format!("`fixed = [\"{}\"]` under `[estimate]`", pose.assumed.join("\", \""));
+    // Nothing else of that joint was learned, so its name says all of it.
+    assert_eq!(pose.hold, [format!("robot.joints.{last}")]);
+    let fixed = format!("`fixed = [\"robot.joints.{last}\"]` under `[estimate]`");
     let words = camera_poses_in_words(&learned).concat();
-    for part in [format!("camera `{name}`: {at} from the tip, ± {:.3} mm; ", 1e3 * sd), fixed] {
+    for part in [format!("camera `{name}`: {at} from the tip, ± {:.3} mm (", 1e3 * sd), fixed] {
         assert!(words.contains(&part), "{part}: {words}");
     }
     let page = page_of(&known, &learned, &recording);
@@ -57,7 +59,7 @@ fn the_pose_of_a_camera_stands_first_and_says_what_is_only_assumed_of_it() {
     assert!(verdict.contains("x, y, z from the tip as given (see below)"), "{verdict}");
     assert!(verdict.find("<dd>") < verdict.find("<li>") && section(&page, "summary").contains("<code>fixed = ["));
     // Held as it says, the pose is known as well as it said, and nothing of it is assumed.
-    known.estimate.fixed = pose.assumed.clone();
+    known.estimate.fixed = pose.hold.clone();
     let held = learn(&known, &recording).unwrap();
     let [held] = &camera_poses(&held)[..] else { panic!("one camera") };
     assert!(held.assumed.is_empty() && (held.sd.unwrap()[0] / sd - 1.0).abs() < 0.2, "{held:?} {sd}");
@@ -74,7 +76,13 @@ fn a_camera_pose_is_told_by_the_command_in_text_and_json() {
     let page = folder.read("page.html");
     let json: Value = serde_json::from_str(&folder.expect(0, &format!("{run} --json")).0).unwrap();
     let text = json["camera_poses"][0]["text"].as_str().unwrap();
-    assert!(said.contains(text) && !said.contains("counts as no better"), "{said}");
+    let (pose, assumed) = text.split_once(". This takes ").unwrap();
+    assert!(said.contains(&format!("\n{pose}\n")) && said.contains(assumed), "{text}\n{said}");
+    let parts = json["camera_poses"][0]["sources"].as_object().unwrap().values();
+    let sum: f64 = parts.map(|part| part.as_f64().unwrap().powi(2)).sum();
+    let sd = json["camera_poses"][0]["sd"][0].as_f64().unwrap();
+    assert!((sum.sqrt() / sd - 1.0).abs() < 1e-9, "{text}");
+    assert!(!said.contains("counts as no better"), "{said}");
     let rms = json["held_out"]["rms_px"].as_f64().unwrap();
     let held_out = format!("Samples that it was not learned from, by 3 folds, it predicts to {rms:.3} px rms");
     assert!(section(&page, "verdict").contains(&held_out), "{held_out}");

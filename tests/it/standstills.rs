@@ -3,7 +3,7 @@ use crate::bag::{bag, read_with};
 use crate::cli::Folder;
 use handeye::calibrate::{Finding as Unfit, Options, calibrate, evaluate};
 use handeye::doctor::{Finding, examine};
-use handeye::recording::{BagOptions, Detection, OpenOptions, Recording, Sample};
+use handeye::recording::{Detection, OpenOptions, Recording, Sample};
 use handeye::report::evaluation_steps;
 use handeye::rig::{Model, Rig};
 use handeye::simulate::{SimulateOptions, random_rig, simulate};
@@ -160,7 +160,8 @@ fn a_lag_that_the_median_hides_is_found_and_named_with_its_cure_and_repeats_lead
                 continue;
             }
             let [lag] = &lags[..] else { panic!("seed {seed}: {lags:?}, {:?}", diagnosis.scores) };
-            let named: f64 = lag.change.rsplit(' ').next().unwrap().parse().unwrap();
+            let named = lag.change.split("--joint-delay ").nth(1).unwrap().split('`').next().unwrap();
+            let named: f64 = named.parse().unwrap();
             assert!(lag.what.ends_with("s too early") && lag.change.contains("--joint-delay"), "{lag:?}");
             assert!((named - delay).abs() <= 0.002, "seed {seed}: {lag:?}");
         }
@@ -213,8 +214,8 @@ fn joints_of_a_bag_are_delayed_by_what_is_asked_for() {
     recording.samples.iter_mut().for_each(|sample| sample.pixels.retain(|seen| seen.feature < 4));
     let bytes = bag(&recording, mcap::WriteOptions::new(), false);
     let read = |joint_delay: Option<f64>| {
-        let of_bag = BagOptions { joint_delay, ..BagOptions::default() };
-        let options = OpenOptions { bag: of_bag, known_joints: recording.joints.clone(), ..OpenOptions::default() };
+        let known_joints = recording.joints.clone();
+        let options = OpenOptions { joint_delay, known_joints, ..OpenOptions::default() };
         read_with(&bytes, &folder, &options).unwrap().recording.samples
     };
     let as_recorded = read(None);
@@ -234,4 +235,27 @@ fn joints_of_a_bag_are_delayed_by_what_is_asked_for() {
             assert!(apart(joints, &expected) < 1e-6, "{delay}, sample {index}");
         }
     }
+}
+
+/// What is on file can be stamped anew too, where samples are dense; between them joints are known to a fraction of a milliradian.
+#[test]
+fn joints_of_a_recording_are_delayed_by_what_is_asked_for_where_samples_are_dense() {
+    let folder = Folder::new("joint-delay-file");
+    for (seed, delay) in [(1, 0.05), (2, -0.04), (3, 0.02)] {
+        let (_, stops, recording) = paused(12, delay, 0.0, seed);
+        recording.write(&folder.path().join("late.jsonl")).unwrap();
+        let (out, err) = folder.expect(0, &format!("convert late.jsonl --joint-delay {delay} -o mended.jsonl"));
+        assert!((out + &err).contains(&format!("are stamped {delay} s later")));
+        let mended = Recording::read(&folder.path().join("mended.jsonl")).unwrap();
+        let lost = recording.samples.len() - mended.samples.len();
+        assert!(lost <= 1, "seed {seed}: {lost} samples lost");
+        for sample in &mended.samples {
+            let off = apart(sample.joints.as_ref().unwrap(), &at(&stops, sample.time.unwrap() - delay));
+            assert!(off < 5e-4, "seed {seed}, {:?}: {off} rad", sample.time);
+        }
+    }
+    let (_, _, recording) = paused(12, 0.0, 0.0, 4);
+    recording.still().unwrap().write(&folder.path().join("still.jsonl")).unwrap();
+    let (out, err) = folder.expect(2, "convert still.jsonl --joint-delay 0.05 -o again.jsonl");
+    assert!((out + &err).contains("still.jsonl: --joint-delay: samples have no times, or the robot moves too far"));
 }

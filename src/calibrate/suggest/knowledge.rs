@@ -1,19 +1,18 @@
 //! How well the numbers of a rig are known together, and what more detections would make of that.
 use super::super::deviations::Honest;
-use super::super::direction::Direction;
 use super::super::evaluate::median;
 use super::super::gauge;
-use super::super::graph::{Built, Freedom, State};
+use super::super::graph::{Freedom, State};
 use super::super::numbers::{Numbers, Part};
 use super::super::outliers::Verdict;
 use crate::Error;
-use handeye_solvers::{Covariance, Solver, WeakDirection};
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
+use handeye_solvers::Covariance;
+use nalgebra::{Cholesky, DMatrix, Dyn, SymmetricEigen};
 
 /// A Gaussian belief about the free numbers of a rig, and the positions of the tip that it is judged by.
 #[derive(Clone, Debug)]
 pub(super) struct Knowledge {
-    /// Covariance of the numbers; what only priors determine counts as known, for no motion changes it.
+    /// Covariance of the numbers, of the part that errors of the recording account for.
     sigma: DMatrix<f64>,
     /// F of M = F Fᵀ, the mean of Jᵀ J over the workspace: tr(M Σ) is the mean variance of the tip. Of the numbers that move the tip,
     /// which come first.
@@ -29,8 +28,8 @@ pub(super) struct Uncertainty {
     pub numbers: Numbers,
     /// Covariance of the numbers.
     pub sigma: DMatrix<f64>,
-    /// Directions that a prior determines more than the data, each one standard deviation long.
-    pub by_priors: Vec<DVector<f64>>,
+    /// The part of it that errors of the recording account for: no motion changes what comes from what was given or measured beside it.
+    pub by_data: DMatrix<f64>,
 }
 
 impl Uncertainty {
@@ -51,27 +50,16 @@ impl Uncertainty {
             ))
         };
         let built = honest.build(free, state, verdict);
-        let mut solver = Solver::new(&built.graph);
-        let weak = WeakDirection::find(&built.graph, &mut solver, Some(&built.states())).map_err(is_open)?;
-        let mut covariance = Covariance::with(&built.graph, solver).map_err(is_open)?;
+        let mut covariance = Covariance::new(&built.graph).map_err(is_open)?;
         let numbers = Numbers::new(free);
         let sigma = numbers.covariance(&built, &mut covariance);
-        let by_priors = weak.iter().filter_map(|weak| of_direction(honest, &built, &numbers, weak)).collect();
-        Ok(Uncertainty { numbers, sigma, by_priors })
+        let mut by_data = sigma.clone();
+        for &factor in built.known.iter().flatten() {
+            let moved = &sigma * numbers.jacobian(&built, &covariance, factor).transpose();
+            by_data.gemm(-1.0, &moved, &moved.transpose(), 1.0);
+        }
+        Ok(Uncertainty { numbers, sigma, by_data })
     }
-}
-
-/// A weak direction over the numbers.
-fn of_direction(honest: &Honest<'_>, built: &Built, numbers: &Numbers, weak: &WeakDirection) -> Option<DVector<f64>> {
-    let Direction { parts, sd } = Direction::of_weak(honest, built, weak);
-    let sd = sd?;
-    let mut v = DVector::zeros(numbers.len);
-    for (at, (part, coordinate)) in numbers.iter().enumerate() {
-        let node = part.node(built);
-        let moves = parts.iter().find(|moves| moves.node == node && moves.coordinate == coordinate);
-        v[at] = moves.map_or(0.0, |moves| sd * moves.weight);
-    }
-    Some(v)
 }
 
 impl Knowledge {
@@ -85,8 +73,7 @@ impl Knowledge {
         }
         let SymmetricEigen { eigenvalues, eigenvectors: mut root } = mean.symmetric_eigen();
         root.column_iter_mut().zip(&eigenvalues).for_each(|(mut column, value)| column *= value.max(0.0).sqrt());
-        let mut sigma = uncertainty.sigma.clone();
-        uncertainty.by_priors.iter().for_each(|v| sigma.ger(-1.0, v, v, 1.0));
+        let sigma = uncertainty.by_data.clone();
         let spread = sigma.columns(0, n) * &root;
         Knowledge { sigma, root, spread, tips }
     }

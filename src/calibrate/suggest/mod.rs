@@ -69,7 +69,7 @@ pub struct Suggestion {
     pub samples: Vec<SuggestedSample>,
     /// Standard deviation now, by the data.
     pub now: f64,
-    /// The same with what only priors determine, which more motions do not change.
+    /// The same with what comes from what was given or measured beside the recording, which more motions hardly change.
     pub with_priors: f64,
     /// True where something metric is known, so that lengths are in metres.
     pub metric: bool,

@@ -199,7 +199,7 @@ impl Account<'_> {
         if second < TURNS * noise || second < ONE_AXIS * first {
             return vec![format!(
                 "the tip turns about one axis alone, {direction} in its own frame: where things mounted on it are along that axis, \
-                 and how they are turned about it, is open and only a prior decides; turn the tip about another axis too"
+                 and how they are turned about it, is open and only what is given decides; turn the tip about another axis too"
             )];
         }
         Vec::new()

@@ -42,9 +42,6 @@ pub struct BagOptions {
     /// Images of several cameras at most this far apart make one sample [s]; `None`: half the time between two images, unless the robot moved
     /// between them.
     pub join: Option<f64>,
-    /// What is added to the stamps of joint states, tip poses and TF before they are interpolated to those of images [s]; negative where they are
-    /// stamped too late.
-    pub joint_delay: Option<f64>,
 }
 
 /// What was found in an image.
@@ -102,7 +99,7 @@ pub(super) fn read<'a>(
     let robot = Robot::new(path, options, &images)?;
     let moments = moments(&groups, &images.images);
     // By the robot's clock.
-    let delay = options.bag.joint_delay.map_or(0, nanoseconds);
+    let delay = options.joint_delay.map_or(0, nanoseconds);
     let theirs = moments.iter().map(|moment| moment.saturating_sub(delay)).collect();
     let (whereabouts, messages) = robot.read(&files, theirs)?;
     let whereabouts = Whereabouts { moments, ..whereabouts };
