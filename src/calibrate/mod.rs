@@ -18,6 +18,7 @@ mod kinematics;
 mod known;
 mod lag;
 mod lengths;
+mod lenses;
 mod leverage;
 mod look;
 mod misfit;
@@ -64,6 +65,7 @@ pub use influence::{Influence, most_influential, worst_fitting};
 pub(crate) use lag::{
     CLEARLY_BETTER, Motion, SAME as SAME_LAG, in_words as lag_in_words, interpolated, usual_distance,
 };
+pub use lenses::{LensNumber, lenses_against_given, lenses_in_words};
 pub(crate) use misfit::over_noise;
 pub(crate) use observation::Kind;
 pub(crate) use outliers::{is_wrong, yardstick};

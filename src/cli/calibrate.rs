@@ -12,9 +12,9 @@ use super::words::{cameras_json, count, duration, error_table, file_name, file_n
 use clap::Args;
 use handeye::Error;
 use handeye::calibrate::{
-    Calibration, CameraPose, Distance, Errors, Finding, NoiseTrial, Options, OverstatedNoise, Progress, Report,
-    Sources, TargetReport, assumptions, calibrate, camera_poses, camera_poses_in_words, findings_in_words, hold,
-    overstated_noise, relearn, select_noise,
+    Calibration, CameraPose, Distance, Errors, Finding, LensNumber, NoiseTrial, Options, OverstatedNoise, Progress,
+    Report, Sources, TargetReport, assumptions, calibrate, camera_poses, camera_poses_in_words, findings_in_words,
+    hold, lenses_against_given, lenses_in_words, overstated_noise, relearn, select_noise,
 };
 use handeye::recording::Recording;
 use handeye::report;
@@ -169,6 +169,8 @@ impl Calibrate {
             Answer::new(describe(&rig, &recording, &calibration, seconds), report_json(report, &recording));
         answer.json["seconds"] = json!(seconds);
         answer.json["camera_poses"] = camera_poses(&calibration).iter().map(camera_pose_json).collect();
+        let lenses = lenses_against_given(&rig, &recording, &calibration);
+        answer.json["lenses_against_given"] = lenses.iter().map(lens_json).collect();
         answer.json["noise_overstated"] = overstated_noise(&calibration).iter().map(overstated_json).collect();
         answer.json["notes"] = json!(notes);
         if !trials.is_empty() {
@@ -248,6 +250,9 @@ fn describe(before: &Rig, recording: &Recording, calibration: &Calibration, seco
     if !cameras.is_empty() {
         text += &format!("\n{}\n", cameras.join("\n"));
     }
+    for line in lenses_in_words(before, recording, calibration) {
+        text += &format!("\n{line}\n");
+    }
     if let Some(noise) = &report.noise {
         text += &format!("\nthe noise, estimated from the data: {}\n", noise::in_words(noise, recorded(report)));
     }
@@ -293,6 +298,11 @@ fn camera_pose_json(pose: &CameraPose) -> Value {
         "metric": pose.metric,
         "text": pose.to_string(),
     })
+}
+
+fn lens_json(lens: &LensNumber) -> Value {
+    let LensNumber { camera, number, given, learned, deviations } = lens;
+    json!({ "camera": camera, "number": number, "given": given, "learned": learned, "deviations": deviations, "text": lens.to_string() })
 }
 
 fn overstated_json(noise: &OverstatedNoise) -> Value {

@@ -85,11 +85,16 @@ impl Suggest {
     }
 }
 
-/// The rig that was given, with what was said besides when the other was learned: measured lengths, and where cameras are that it does not list.
+/// The rig that was given, with what was said besides when the other was learned: what is held, measured lengths, and where cameras are that it does not list.
 fn as_learned(mut given: Rig, learned: &Rig) -> Rig {
     for Camera { name, parent, .. } in &learned.cameras {
         if !given.cameras.iter().any(|camera| camera.name == *name) {
             given.cameras.push(Camera { name: name.clone(), parent: *parent, ..Camera::default() });
+        }
+    }
+    for pattern in &learned.estimate.fixed {
+        if !given.estimate.fixed.contains(pattern) {
+            given.estimate.fixed.push(pattern.clone());
         }
     }
     given.estimate.tag_side = given.estimate.tag_side.or(learned.estimate.tag_side);

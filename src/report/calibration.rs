@@ -5,8 +5,8 @@ use super::{arm, noise, residuals, sections, values, verdict};
 use crate::Error;
 use crate::calibrate::{
     Calibration, Combination, DeterminedBy, Influence, SuggestOptions, SuggestedSample, Suggestion, TargetReport,
-    camera_poses_in_words, combinations_in_words, findings_in_words, length_in_words, most_influential,
-    overstated_noise, suggest, times,
+    camera_poses_in_words, combinations_in_words, findings_in_words, length_in_words, lenses_in_words,
+    most_influential, overstated_noise, suggest, times,
 };
 use crate::recording::Recording;
 use crate::rig::Rig;
@@ -117,6 +117,7 @@ fn summary(page: &mut Page, subject: &Subject<'_>) {
     page.list(&report.states);
     page.list(&report.targets.as_ref().map_or_else(Vec::new, TargetReport::remarks));
     page.list(&camera_poses_in_words(subject.calibration));
+    page.list(&lenses_in_words(subject.before, subject.recording, subject.calibration));
     if report.findings.is_empty() {
         page.paragraph("Nothing in the recording stands out as wrong.");
     } else {

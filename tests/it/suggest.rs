@@ -376,4 +376,10 @@ fn the_rig_that_calibration_started_from_is_asked_for_by_its_option() {
     let (_, err) = folder.expect(2, "suggest arm.toml --with motions.jsonl");
     assert!(err.contains("give the rig that calibration started from, as `--rig RIG`"), "{err}");
     folder.expect(0, "suggest arm.toml --with motions.jsonl --rig ur5 --count 1");
+    // What was held by an option is in the learned rig's file.
+    folder.expect(
+        0,
+        "calibrate motions.jsonl --rig ur5 --hold cameras.*.intrinsics --hold robot.joints.elbow -o held.toml",
+    );
+    folder.expect(0, "suggest held.toml --with motions.jsonl --rig ur5 --count 1");
 }
