@@ -214,7 +214,7 @@ def test_options_of_other_formats_and_words_that_say_nothing_are_refused(motions
         ({"frames": ("base", "tip")}, "frames: none of the recordings is a bag, so that it has no effect"),
         ({"camera_topics": {"/tags": None}}, "camera_topics: none of the recordings is a bag"),
         ({"degrees": True}, "degrees: none of the recordings is a table"),
-        ({"joint_delay": 0.01}, "joint_delay: none of the recordings is a bag"),
+        ({"joint_delay": 0.01}, "the robot moves too far from one to the next to know where it was between them"),
         ({"joints": ["a"]}, "there is no joint `a`"),
         ({"episodes": [0]}, "episodes: none of the recordings is a table"),
         ({"cameras": {"nose": {"size": (640, 480)}}}, "there are no images of a camera `nose`"),
