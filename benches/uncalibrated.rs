@@ -1,11 +1,14 @@
 //! Servoing without a rig: default settings beside a Jacobian that is kept, cameras carried around the target; and CPU time of one step.
 //!
-//! `cargo bench --bench uncalibrated -- [SCENES [PLACES]]`: scenes drawn beside the reconstructed one, and places of the cameras in each.
+//! `cargo bench --bench uncalibrated -- [SCENES [PLACES]]`: scenes drawn beside the reconstructed one and that of round numbers, and
+//! places of the cameras in each.
 //! `diverged` counts the runs whose errors grew by more than 100 px in a step, `kept` those with the Jacobian kept; `refused` those that were
 //! stopped with the reason that what is seen does not determine the motion. Iterations, image and 3D errors are ratios to those with the
 //! Jacobian kept, over the places where both arrive: mean over the rows, largest, and how many rows are above 1. A row is one scene,
 //! exploratory motion and gain. Last stand the iterations on the reconstructed scene, most of its rows. The second table is what the exact
 //! Jacobian of every moment leads to with the same gain and trackers, and no regard for how far it holds: nobody can know it better.
+//! In the third, points are seen exactly and only their target is rounded: the 3D error that is left then is what trackers that round leave open; its image errors are not of whole
+//! pixels, and say nothing.
 use cpu_time::ThreadTime;
 use handeye::experiments::camera_rotation::{ITERATIONS, Run, Scene, Tracker, View, World, carried_around};
 use handeye::servo::LimitRows;
@@ -26,7 +29,7 @@ fn main() {
     let scenes = numbers.first().copied().unwrap_or(4);
     let places = numbers.get(1).copied().unwrap_or(36);
     let drawn = (0..scenes as u64).map(|seed| Scene::drawn(seed).expect("the shipped arm"));
-    let scenes: Vec<Scene> = std::iter::once(Scene::RECONSTRUCTED).chain(drawn).collect();
+    let scenes: Vec<Scene> = [Scene::RECONSTRUCTED, Scene::ROUND].into_iter().chain(drawn).collect();
     println!(
         "{} scenes, {places} places of the cameras, ratios to the Jacobian kept as mean / largest / rows above 1",
         scenes.len()
@@ -42,6 +45,15 @@ fn main() {
     table(&scenes, &around, &|scene, tracker, gain, _| {
         (0..places).map(|place| with_exact_jacobian(scene, tracker, gain, (place, places))).collect()
     });
+    println!("\nthe same with the exact Jacobian and points seen exactly, where only the target is rounded");
+    for gain in GAINS {
+        let kept = |scene: &Scene, size: f64| around(scene, Tracker::Rounded, &Settings::plain(gain, size));
+        let ours = |scene: &Scene, _: f64| {
+            let at = |place| with_exact_jacobian(scene, Tracker::RoundedTarget, gain, (place, places));
+            (0..places).map(at).collect()
+        };
+        println!("{:8} {gain:>5} {}", "rounded", row(&scenes, &kept, &ours));
+    }
     time();
 }
 

@@ -11,6 +11,7 @@ use handeye_solvers::nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use std::f64::consts::{FRAC_PI_4, PI};
 
 /// Where the arm begins and where it shall be, as joints [rad].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,6 +20,8 @@ pub struct Scene {
     pub start: [f64; 6],
     /// Joints whose view is the target.
     pub target: [f64; 6],
+    /// Focal length of the cameras [px]; the principal point is at 0.
+    pub focal: f64,
 }
 
 /// What a tracker makes of a pixel.
@@ -28,6 +31,8 @@ pub enum Tracker {
     Perfect,
     /// The nearest whole pixel.
     Rounded,
+    /// The pixel of what moves, and the nearest whole pixel of its target: no more can be known of a target that is seen in whole pixels.
+    RoundedTarget,
     /// The pixel with normal noise of this standard deviation [px], drawn anew for every measurement.
     Gaussian(f64),
 }
@@ -57,7 +62,7 @@ pub struct World {
 /// The tool's points in the frame of the last link [m]: those of the thesis (listing 2), 0.1 m in front of it.
 const POINTS: [[f64; 3]; 3] = [[0.0, 0.0, 0.2], [0.0, -0.1, 0.0], [0.0, 0.1, 0.0]];
 
-/// Focal length [px]; the principal point is at 0.
+/// Focal length of Corke's default camera [px].
 const FOCAL: f64 = 800.0;
 
 /// Distance between start and target [m], as in the thesis.
@@ -68,6 +73,14 @@ impl Scene {
     pub const RECONSTRUCTED: Scene = Scene {
         start: [0.5360, 2.0173, 2.9420, 0.2724, 0.5988, -0.4495],
         target: [0.6245, 2.7478, 2.1798, 0.2600, 1.0457, -0.8363],
+        focal: FOCAL,
+    };
+
+    /// Round numbers: from the arm's nominal pose in Corke's toolbox, to one of the targets whose table 5.2 is as the thesis's is.
+    pub const ROUND: Scene = Scene {
+        start: [0.0, FRAC_PI_4, PI, 0.0, FRAC_PI_4, 0.0],
+        target: [0.4, 0.8, 2.6, -0.4, 0.7, 0.7],
+        focal: 480.0,
     };
 
     /// That of a trial: the reconstructed one in the first, others drawn.
@@ -81,7 +94,7 @@ impl Scene {
     ///
     /// Errors: none with the shipped arm.
     pub fn drawn(seed: u64) -> Result<Scene, Error> {
-        let arm = Arm::new(&rig(&[])?)?;
+        let arm = Arm::new(&rig(&[], FOCAL)?)?;
         let random = &mut ChaCha8Rng::seed_from_u64(seed);
         loop {
             let wrist = random.random_range(0.3..1.5) * if random.random_bool(0.5) { 1.0 } else { -1.0 };
@@ -101,7 +114,7 @@ impl Scene {
                 continue;
             };
             if (0..=10).all(|step| regularity(&arm, &at(0.1 * f64::from(step) * far)) > REGULAR) {
-                return Ok(Scene { start: at(far), target });
+                return Ok(Scene { start: at(far), target, focal: FOCAL });
             }
         }
     }
@@ -129,8 +142,8 @@ fn centre(arm: &Arm, joints: &[f64]) -> Vector3<f64> {
     points(&at).iter().sum::<Vector3<f64>>() / 3.0
 }
 
-/// The arm with its points and with cameras at poses `world_from_camera`.
-fn rig(cameras: &[Pose]) -> Result<Rig, Error> {
+/// The arm with its points and with cameras of a focal length [px] at poses `world_from_camera`.
+fn rig(cameras: &[Pose], focal: f64) -> Result<Rig, Error> {
     let mut rig = catalog::rig("puma560")?;
     let feature = |(index, point): (usize, &[f64; 3])| Feature {
         name: format!("point-{index}"),
@@ -140,8 +153,8 @@ fn rig(cameras: &[Pose]) -> Result<Rig, Error> {
     rig.features = POINTS.iter().enumerate().map(feature).collect();
     let camera = |(index, pose): (usize, &Pose)| Camera {
         name: format!("camera-{index}"),
-        fx: Some(FOCAL),
-        fy: Some(FOCAL),
+        fx: Some(focal),
+        fy: Some(focal),
         cx: Some(0.0),
         cy: Some(0.0),
         pose: Some(*pose),
@@ -157,13 +170,14 @@ impl Tracker {
         match self {
             Tracker::Perfect => 0.0,
             Tracker::Rounded => (2.0_f64 / 12.0).sqrt(),
+            Tracker::RoundedTarget => (1.0_f64 / 12.0).sqrt(),
             Tracker::Gaussian(sd) => 2.0_f64.sqrt() * sd,
         }
     }
 
     fn track(&self, pixel: f64, random: &mut ChaCha8Rng) -> f64 {
         match self {
-            Tracker::Perfect => pixel,
+            Tracker::Perfect | Tracker::RoundedTarget => pixel,
             Tracker::Rounded => pixel.round(),
             Tracker::Gaussian(sd) => {
                 let noise: f64 = StandardNormal.sample(random);
@@ -191,9 +205,9 @@ impl View {
 impl World {
     /// Errors: none with the shipped arm.
     pub fn new(scene: &Scene, views: &[View], tracker: Tracker, seed: u64) -> Result<World, Error> {
-        let target = centre(&Arm::new(&rig(&[])?)?, &scene.target);
+        let target = centre(&Arm::new(&rig(&[], scene.focal)?)?, &scene.target);
         let poses: Vec<Pose> = views.iter().map(|view| view.pose(&target)).collect();
-        let arm = Arm::new(&rig(&poses)?)?;
+        let arm = Arm::new(&rig(&poses, scene.focal)?)?;
         let mut world = World {
             arm,
             at: Configuration::default(),
@@ -240,8 +254,9 @@ impl World {
     /// What the trackers see of the points minus what they see of the target [px].
     pub fn errors(&mut self) -> Vec<f64> {
         let pixels = self.pixels();
+        let of_target = if self.tracker == Tracker::RoundedTarget { Tracker::Rounded } else { self.tracker };
         let mut see = |(pixel, target): (&f64, &f64)| {
-            self.tracker.track(*pixel, &mut self.random) - self.tracker.track(*target, &mut self.random)
+            self.tracker.track(*pixel, &mut self.random) - of_target.track(*target, &mut self.random)
         };
         pixels.iter().zip(&self.target_pixels).map(&mut see).collect()
     }
