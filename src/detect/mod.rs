@@ -49,7 +49,10 @@ impl Pattern {
             let (columns, rows) = text.split_once('x')?;
             Some((columns.parse().ok()?, rows.parse().ok()?))
         };
-        let Some((kind, of)) = text.split_once('=') else { return family(text).map(Pattern::Tags) };
+        let Some((kind, of)) = text.split_once('=') else {
+            let boards = "boards are checkerboard=COLUMNSxROWS or charuco=COLUMNSxROWS:FAMILY:RATIO";
+            return family(text).map(Pattern::Tags).map_err(|unknown| format!("{unknown}; {boards}"));
+        };
         match (kind, &of.split(':').collect::<Vec<_>>()[..]) {
             ("checkerboard", [board]) => {
                 let size = size(board).ok_or("expected checkerboard=COLUMNSxROWS, of inner corners")?;

@@ -81,10 +81,7 @@ impl Recording {
             }
             None => (groups, None),
         };
-        let blank = images.iter().filter(|image| image.features.is_empty()).count();
-        if blank > 0 {
-            notes.push(format!("{blank} of {} images show nothing of what is looked for", images.len()));
-        }
+        notes.extend(note_on_blank(images, &cameras));
         let found = match (rows, at) {
             (None, _) => groups.iter().map(|_| Sample::default()).collect(),
             (Some(Rows { states, .. }), Some((whereabouts, spans))) => {
@@ -121,6 +118,29 @@ impl Recording {
         Ok((recording.checked().map_err(|error| error.to_string())?, notes))
     }
 }
+
+/// Images that show nothing, by their names: samples are numbered without them.
+fn note_on_blank(images: &[ImageSeen], cameras: &[RecordedCamera]) -> Option<String> {
+    let blank: Vec<&ImageSeen> = images.iter().filter(|image| image.features.is_empty()).collect();
+    let name = |image: &&ImageSeen| match cameras.get(image.camera as usize).filter(|_| cameras.len() > 1) {
+        Some(camera) => format!("{} of {}", image.name, camera.name),
+        None => image.name.clone(),
+    };
+    let mut names: Vec<String> = blank.iter().take(NAMED).map(name).collect();
+    if blank.len() > NAMED {
+        names.push(format!("{} more", blank.len() - NAMED));
+    }
+    let (count, of) = (blank.len(), images.len());
+    let names = names.join(", ");
+    (count > 0).then(|| {
+        format!(
+            "{count} of {of} images show nothing of what is looked for ({names}); samples are numbered from 0, without those of which no image does"
+        )
+    })
+}
+
+/// Images that a note names.
+const NAMED: usize = 12;
 
 /// The names of all images, each once.
 fn in_order_of_names(images: &[ImageSeen]) -> Vec<&str> {
