@@ -132,6 +132,36 @@ fn no_place_of_the_cameras_diverges_and_all_arrive_sooner_than_with_a_jacobian_t
     }
 }
 
+/// Means over the places where both arrive, of the defaults and of a Jacobian that is kept.
+fn beside_kept(scene: &Scene, tracker: Tracker, size_deg: f64, gain: f64, figure: impl Fn(&Run) -> f64) -> [f64; 2] {
+    let around = |settings: &Settings| carried_around(scene, tracker, settings, 36, 1).unwrap();
+    let explored = Exploration::fixed(size_deg.to_radians());
+    let ours = around(&Settings { gain, exploration: explored, ..Settings::default() });
+    let kept = around(&Settings::plain(gain, size_deg.to_radians()));
+    assert!(ours.iter().all(|run| !run.diverged()));
+    let arrive = |run: &Run| !run.diverged() && run.steps(1).is_some();
+    let both: Vec<usize> = (0..36).filter(|i| arrive(&kept[*i]) && arrive(&ours[*i])).collect();
+    [&ours, &kept].map(|runs| mean(both.iter().map(|i| figure(&runs[*i]))))
+}
+
+#[test]
+fn a_large_motion_does_not_spoil_what_is_known_of_directions_that_hardly_show() {
+    let scene = Scene::drawn(8).unwrap();
+    for (tracker, gain) in [(Tracker::Perfect, 0.75), (Tracker::Gaussian(0.2), 1.0)] {
+        let [ours, kept] = beside_kept(&scene, tracker, 10.0, gain, |run| run.steps(1).unwrap() as f64);
+        assert!(ours < kept, "{tracker:?}: {ours} iterations, {kept} with the Jacobian kept");
+    }
+}
+
+#[test]
+fn errors_that_no_known_motion_removes_are_removed_by_one_that_is_tried() {
+    let scene = Scene::drawn(16).unwrap();
+    let space = beside_kept(&scene, Tracker::Gaussian(0.2), 6.0, 0.25, |run| run.error_3d);
+    let image = beside_kept(&scene, Tracker::Gaussian(0.2), 6.0, 0.25, |run| *run.errors.last().unwrap());
+    assert!(space[0] < 0.8 * space[1], "{space:?} m");
+    assert!(image[0] < 1.02 * image[1], "{image:?} px");
+}
+
 #[test]
 fn two_views_at_about_a_right_angle_serve_best_and_one_point_of_view_is_refused_before_anything_moves() {
     let of = |first: f64, apart_deg: f64| {

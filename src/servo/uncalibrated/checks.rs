@@ -24,6 +24,7 @@ pub(super) fn check(quantities: &[Quantity], rows: &[Row], settings: &Settings) 
         size("exploration.largest", explored.largest),
         least("exploration.clarity", explored.clarity),
         size("curvature", settings.curvature),
+        least("dither", settings.dither),
         above("divergence", settings.divergence),
         above("worst_condition", settings.worst_condition),
     ];

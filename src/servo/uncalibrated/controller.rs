@@ -1,5 +1,6 @@
 //! The controller: what goes in, what comes out, and which phase follows.
 use super::checks::check;
+use super::dither::Dither;
 use super::estimate::{Estimate, dot};
 use super::exploration::Explorer;
 use super::foresight::{Ahead, Foresight};
@@ -8,6 +9,7 @@ use super::settings::Settings;
 use super::signals::{Command, Phase, Quantity, Row, Stop};
 use super::stall::Stall;
 use super::trust::Aim;
+use super::whole_pixels::WholePixels;
 use crate::Error;
 use crate::rig::Limits;
 use crate::servo::{Active, Constraint, JointBounds, LimitRows, MotionSolver, TaskRows};
@@ -36,6 +38,10 @@ pub struct Uncalibrated {
     pub(super) moved: Vec<f64>,
     pub(super) velocity: Vec<f64>,
     pub(super) stall: Stall,
+    /// Rows of whole pixels; while they are dithered, and whether they were.
+    pub(super) whole: WholePixels,
+    pub(super) dither: Option<Dither>,
+    pub(super) has_dithered: bool,
     /// Whether something held the last motion back.
     pub(super) is_held: bool,
     /// Whether things moved since as they were told to.
@@ -73,6 +79,9 @@ impl Uncalibrated {
             good: None,
             losses: 0,
             stall: Stall::default(),
+            whole: WholePixels::new(rows.len()),
+            dither: None,
+            has_dithered: false,
             is_held: false,
             moved_as_told: false,
             noise: 1.0,
@@ -109,6 +118,7 @@ impl Uncalibrated {
         (self.estimate, self.explorer, self.phase) = (Some(estimate), None, Phase::Servoing);
         (self.ahead, self.good, self.losses) = (None, None, 0);
         self.stall = Stall::default();
+        (self.dither, self.has_dithered) = (None, false);
         self.unmeasured = (0..m).collect();
         self.dropped.clear();
         self.readings.clear();
@@ -122,6 +132,7 @@ impl Uncalibrated {
         (self.ahead, self.explorer, self.estimate) = (Some(Ahead::new(model)), None, None);
         (self.good, self.losses) = (None, 0);
         self.stall = Stall::default();
+        (self.dither, self.has_dithered) = (None, false);
         self.unmeasured.clear();
         self.dropped.clear();
         self.readings.clear();
@@ -137,7 +148,8 @@ impl Uncalibrated {
             return Err(Error::Unusable(format!("{found} changes of errors, where {m} finite ones are wanted")));
         }
         self.errors.iter_mut().zip(changes).for_each(|(error, change)| *error += change);
-        self.stall = Stall::default();
+        self.stall.shifts();
+        (self.dither, self.has_dithered) = (None, false);
         if let Some(explorer) = &mut self.explorer {
             explorer.shift(changes);
         }
@@ -235,6 +247,7 @@ impl Uncalibrated {
         let told = dot(&self.told, &self.told);
         self.moved_as_told = told > 0.0 && dot(&self.told, &self.moved) > 0.5 * told;
         self.bounds.update(&self.limits, readings, &self.velocity, dt);
+        self.whole.take_in(&self.errors, errors);
         self.seen.clear();
         self.seen.extend((0..errors.len()).filter(|row| errors[*row].is_finite() && !self.dropped.contains(row)));
     }
@@ -255,6 +268,7 @@ impl Uncalibrated {
         let (Some(estimate), None) = (&mut self.estimate, &self.explorer) else {
             return self.explore(readings, errors, limits);
         };
+        (0..errors.len()).for_each(|row| estimate.see_whole(row, self.whole.are_of(row)));
         let changes =
             self.seen.iter().map(|&row| errors[row].abs() - self.errors.get(row).map_or(f64::NAN, |error| error.abs()));
         let growth: f64 = changes.filter(|change| change.is_finite()).sum();
@@ -284,6 +298,9 @@ impl Uncalibrated {
             }
             !is_seen
         });
+        if self.dither.is_some() {
+            return self.dither(readings, errors, limits);
+        }
         self.servo(readings, errors, limits)
     }
 }

@@ -1,11 +1,13 @@
 //! What is known of the errors and of how they change with what is controlled: a Kalman filter per row.
+use super::whole_pixels::{self, ROUNDED, beside_rounding, between};
 use crate::Error;
 use nalgebra::DMatrix;
 
 /// Errors, their slopes, and the covariance of both; rows are independent of each other.
 ///
-/// A row's state is (e, j). A motion d turns it into (e + j·d + w·d / 2, j + w), with w normal of variance (κ |d| s)² in every slope: s is
-/// the root mean square of the row's slopes and κ the curvature.
+/// A row's state is (e, j). A motion d turns it into (e + j·d + w·d / 2, j + w), with w normal of covariance (κ |d| s)² S: s is the root mean
+/// square of the row's slopes and κ the curvature. S = (1 - β) I + β n Jᵀ J / |J|²: slopes along directions that hardly show change less, as
+/// most of a change mixes and scales rows. With S = I, what a large motion teaches would be put down to just these directions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
     n: usize,
@@ -16,10 +18,19 @@ pub struct Estimate {
     /// Per row: variance of the noise [px²], mean square of the slopes.
     variances: Vec<f64>,
     scales: Vec<f64>,
+    /// Per row, whether it is seen in whole pixels.
+    whole: Vec<bool>,
+    /// S, with J as explored.
+    shape: Vec<f64>,
     /// κ, as far as it is known by now.
     pub(super) curvature: f64,
     work: Vec<f64>,
+    /// S d.
+    bent: Vec<f64>,
 }
+
+/// β.
+const ALIKE: f64 = 0.94;
 
 /// How far a target wanders in one step, as a share of a row's standard deviation: what is seen of it is averaged over the last few steps,
 /// which suits trackers that round and trackers that scatter.
@@ -63,8 +74,11 @@ impl Estimate {
             covariances: vec![0.0; m * size * size],
             variances: sds.iter().map(|sd| sd.max(LEAST_SD).powi(2)).collect(),
             scales: Vec::new(),
+            whole: vec![false; m],
+            shape: shape(slopes),
             curvature,
             work: vec![0.0; n],
+            bent: vec![0.0; n],
         };
         for (row, covariance) in covariances.iter().enumerate() {
             let of_slopes = slopes.row(row);
@@ -110,6 +124,11 @@ impl Estimate {
     /// Variance of a row's noise [px²].
     pub fn variance(&self, row: usize) -> f64 {
         self.variances[row]
+    }
+
+    /// Takes a row for one that is seen in whole pixels, or not.
+    pub(super) fn see_whole(&mut self, row: usize, is_whole: bool) {
+        self.whole[row] = is_whole;
     }
 
     /// Mean square of a row's slopes when they were explored.
@@ -165,48 +184,62 @@ impl Estimate {
         Some(found.row_iter().map(|direction| direction.iter().copied().collect()).collect())
     }
 
+    /// Variance by which a row's target wanders in a step [px²].
+    fn wander(&self, row: usize) -> f64 {
+        if self.whole[row] { whole_pixels::WANDER } else { WANDER * WANDER * self.variances[row] }
+    }
+
     /// Everything has moved, and slopes have changed by a curvature on the way.
     pub(super) fn moved(&mut self, motion: &[f64], curvature: f64) {
         let (n, size) = (self.n, self.n + 1);
         let square: f64 = dot(motion, motion);
+        self.bent.iter_mut().zip(self.shape.chunks(n)).for_each(|(bent, line)| *bent = dot(line, motion));
+        let bend = dot(&self.bent, motion);
         for row in 0..self.variances.len() {
+            let wander = self.wander(row);
             let state = &mut self.states[row * size..(row + 1) * size];
             state[0] += dot(&state[1..], motion);
             let entries = &mut self.covariances[row * size * size..(row + 1) * size * size];
             let spread = curvature * curvature * square * self.scales[row];
-            let mut own = entries[0] + 0.25 * spread * square + WANDER * WANDER * self.variances[row];
+            let mut own = entries[0] + 0.25 * spread * bend + wander;
             for i in 0..n {
                 let across = entries[i + 1];
                 let along = dot(&entries[(i + 1) * size + 1..(i + 2) * size], motion);
                 own += motion[i] * (2.0 * across + along);
-                self.work[i] = across + along + 0.5 * spread * motion[i];
+                self.work[i] = across + along + 0.5 * spread * self.bent[i];
             }
             entries[0] = own;
             for i in 0..n {
                 (entries[i + 1], entries[(i + 1) * size]) = (self.work[i], self.work[i]);
-                entries[(i + 1) * size + i + 1] += spread;
+                let line = &mut entries[(i + 1) * size + 1..(i + 2) * size];
+                line.iter_mut().zip(&self.shape[i * n..]).for_each(|(entry, shape)| *entry += spread * shape);
             }
         }
     }
 
-    /// An error was measured [px].
+    /// An error was measured [px]. Of whole pixels it is known to lie within half a pixel, and where it was known better already, nothing new.
     pub(super) fn measured(&mut self, row: usize, error: f64) {
         let size = self.n + 1;
         let state = &mut self.states[row * size..(row + 1) * size];
         let entries = &mut self.covariances[row * size * size..(row + 1) * size * size];
-        let total = entries[0] + self.variances[row];
-        let surprise = error - state[0];
+        let [mut total, mut surprise, mut told] = [entries[0] + self.variances[row], error - state[0], 1.0];
+        if self.whole[row] {
+            total = entries[0] + beside_rounding(self.variances[row]);
+            let sd = total.sqrt();
+            let [mean, variance] = between((surprise - 0.5) / sd, (surprise + 0.5) / sd);
+            (surprise, told) = (sd * mean, 1.0 - variance);
+        }
         self.work.copy_from_slice(&entries[1..size]);
         let own = entries[0] / total;
         state[0] += own * surprise;
         for (i, &across) in self.work.iter().enumerate() {
             state[i + 1] += across / total * surprise;
             let line = &mut entries[(i + 1) * size + 1..(i + 2) * size];
-            line.iter_mut().zip(&self.work).for_each(|(entry, other)| *entry -= across * other / total);
+            line.iter_mut().zip(&self.work).for_each(|(entry, other)| *entry -= told * across * other / total);
         }
-        entries[0] *= 1.0 - own;
+        entries[0] *= 1.0 - told * own;
         for i in 1..size {
-            entries[i] *= 1.0 - own;
+            entries[i] *= 1.0 - told * own;
             entries[i * size] = entries[i];
         }
     }
@@ -220,6 +253,14 @@ impl Estimate {
             (entries[i], entries[i * size]) = (0.0, 0.0);
         }
         entries[0] = self.variances[row];
+    }
+
+    /// Takes over a row's error [px] and slopes that were found from whole pixels, and their covariance over the variance of each.
+    pub(super) fn relearn(&mut self, row: usize, state: &[f64], covariance: &DMatrix<f64>) {
+        let (size, variance) = (self.n + 1, ROUNDED + beside_rounding(self.variances[row]));
+        self.states[row * size..(row + 1) * size].copy_from_slice(state);
+        let entries = &mut self.covariances[row * size * size..(row + 1) * size * size];
+        entries.iter_mut().zip(covariance.iter()).for_each(|(entry, covariance)| *entry = variance * covariance);
     }
 
     /// What shall be seen has moved: a row's error with it [px].
@@ -247,11 +288,25 @@ impl Estimate {
 
     /// Variance of a row that is measured after a motion [px²].
     pub fn variance_along(&self, row: usize, motion: &[f64]) -> f64 {
+        self.variance_bent(row, motion, self.bend(motion))
+    }
+
+    /// The same, of a motion's [`Estimate::bend`].
+    pub(super) fn variance_bent(&self, row: usize, motion: &[f64], bend: f64) -> f64 {
         let size = self.n + 1;
         let entries = &self.covariances[row * size * size..(row + 1) * size * size];
-        let bend = 0.25 * (self.curvature * dot(motion, motion)).powi(2) * self.scales[row];
         let across = dot(&entries[1..size], motion);
-        entries[0] + 2.0 * across + self.doubt(row, motion) + bend + (1.0 + WANDER * WANDER) * self.variances[row]
+        entries[0]
+            + 2.0 * across
+            + self.doubt(row, motion)
+            + self.scales[row] * bend
+            + (1.0 + WANDER * WANDER) * self.variances[row]
+    }
+
+    /// Variance of a row's change by a motion, from slopes that change on the way, over the mean square of its slopes.
+    pub(super) fn bend(&self, motion: &[f64]) -> f64 {
+        let along: f64 = motion.iter().zip(self.shape.chunks(self.n)).map(|(d, line)| d * dot(line, motion)).sum();
+        0.25 * self.curvature.powi(2) * dot(motion, motion) * along
     }
 
     /// Counts each of a row's slopes as less certain by a variance.
@@ -275,6 +330,13 @@ impl Estimate {
         let slopes = &mut self.states[row * size + 1..(row + 1) * size];
         slopes.iter_mut().zip(motion).for_each(|(slope, motion)| *slope += factor * motion);
     }
+}
+
+/// S of the slopes.
+fn shape(slopes: &DMatrix<f64>) -> Vec<f64> {
+    let (n, square) = (slopes.ncols(), slopes.norm_squared());
+    let seen = if square > 0.0 { slopes.transpose() * slopes * (n as f64 / square) } else { DMatrix::identity(n, n) };
+    (DMatrix::identity(n, n) * (1.0 - ALIKE) + seen * ALIKE).as_slice().to_vec()
 }
 
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {

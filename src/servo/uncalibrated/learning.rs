@@ -91,8 +91,10 @@ fn filter(setting: f64, estimate: &mut Estimate, lesson: &Lesson<'_>) {
 fn bend(setting: f64, estimate: &mut Estimate, lesson: &Lesson<'_>) {
     let (mut surprise, mut expected, mut noise) = (0.0, 0.0, 0.0);
     let mut each = Vec::with_capacity(lesson.seen.len());
+    let bend = estimate.bend(lesson.motion);
     for &row in lesson.seen {
-        let [there, variance] = estimate.foresee(row, lesson.motion);
+        let there = estimate.error(row) + dot(estimate.slopes(row), lesson.motion);
+        let variance = estimate.variance_bent(row, lesson.motion, bend);
         let square = (lesson.now[row] - there).powi(2);
         each.push(square / variance);
         surprise += square;

@@ -7,6 +7,7 @@
 //! Visual Servoing", 2016; [`Settings::plain`] is his controller, the defaults are ours.
 mod checks;
 mod controller;
+mod dither;
 mod estimate;
 mod exploration;
 mod foresight;
@@ -18,6 +19,7 @@ mod signals;
 mod stall;
 mod trust;
 mod views;
+mod whole_pixels;
 
 pub use controller::Uncalibrated;
 pub use estimate::Estimate;

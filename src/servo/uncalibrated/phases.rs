@@ -1,5 +1,6 @@
 //! What each phase does: exploring, servoing, and what follows where the Jacobian is lost.
 use super::controller::Uncalibrated;
+use super::dither::Dither;
 use super::estimate::{Estimate, dot};
 use super::exploration::{Explorer, Next};
 use super::settings::Update;
@@ -35,11 +36,7 @@ impl Uncalibrated {
         let Some(explorer) = &mut self.explorer else { return Phase::Exploring };
         match explorer.next(&self.settings, &self.rows, readings, errors) {
             Next::Towards(there) => {
-                self.tasks[0].clear(n);
-                for (i, (there, here)) in there.iter().zip(readings).enumerate() {
-                    self.tasks[0].push((0..n).map(|k| if k == i { 1.0 } else { 0.0 }), there - here, 1.0);
-                }
-                self.solve(limits);
+                self.go_towards(&there, readings, limits);
                 Phase::Exploring
             }
             Next::Done(mut estimate) => {
@@ -86,8 +83,10 @@ impl Uncalibrated {
             None => None,
         };
         let mut share = self.settings.gain;
+        let mut slack = 0.0;
         if let Some(trust) = &self.settings.trust {
-            share *= self.aim.share(estimate, &self.seen, share, trust, 0.5 * self.settings.divergence);
+            let safe = self.aim.share(estimate, middle, &self.seen, share, trust, 0.5 * self.settings.divergence);
+            (share, slack) = (share * safe.share, safe.slack);
         }
         let swallowed = |gain: f64, factor: f64| {
             let mut all = self.aim.motion.iter().zip(&self.quantities);
@@ -99,19 +98,40 @@ impl Uncalibrated {
         }
         let converged = removable <= n as f64 + 2.0 * (2.0 * n as f64).sqrt() || swallowed(1.0, 1.0);
         let adapts = !matches!(self.settings.update, Update::Keep) && self.losses < LOSSES;
-        let is_excused = self.is_held || swallowed(1.0, 1.0) || !self.moved_as_told;
+        // Where something holds the motion back, it may be the Jacobian that asks for the wrong one.
+        let is_excused = swallowed(1.0, 1.0) || !self.moved_as_told;
         let (left, noise) = (estimate.left(&self.seen), self.noise);
         if adapts && self.stall.judge(left, self.seen.len(), noise, is_excused) {
             return self.explore_anew(readings, errors, limits);
         }
+        let is_free = adapts && !is_excused && !self.is_held && middle.is_none();
+        let may_dither = is_free && converged && self.settings.dither > 0.0 && !self.has_dithered;
+        if may_dither && self.seen.iter().all(|&row| self.whole.are_of(row)) {
+            self.has_dithered = true;
+            self.dither = Dither::new(&self.settings, estimate, &self.seen, readings);
+            return self.dither(readings, errors, limits);
+        }
+        let mut trial = None;
+        if let Some(trust) = &self.settings.trust
+            && is_free
+            && self.stall.tries(left, removable, self.seen.len(), n)
+        {
+            let longest = self.settings.exploration.largest;
+            trial = self.aim.trial(estimate, &self.seen, trust, longest, slack);
+        }
+        if let Some(trial) = &trial {
+            self.aim.motion.iter_mut().zip(trial).for_each(|(motion, trial)| *motion = share * *motion + trial);
+            share = 1.0;
+        }
         self.tasks[0].clear(n);
         for &row in &self.seen {
             let slopes = middle.unwrap_or(estimate).slopes(row);
-            let wanted = if middle.is_some() { dot(slopes, &self.aim.motion) } else { -estimate.error(row) };
+            let wanted =
+                if middle.is_some() || trial.is_some() { dot(slopes, &self.aim.motion) } else { -estimate.error(row) };
             let sd = middle.unwrap_or(estimate).variance(row).sqrt();
             self.tasks[0].push(slopes.iter().copied(), wanted, sd);
         }
-        if restraint > 0.0 {
+        if restraint > 0.0 && trial.is_none() {
             let sd = self.aim.damping.sqrt().recip();
             (0..n).for_each(|i| self.tasks[0].push((0..n).map(|k| if k == i { 1.0 } else { 0.0 }), 0.0, sd));
         }
@@ -156,6 +176,16 @@ impl Uncalibrated {
         self.seen.iter().for_each(|&row| good.reset(row, errors[row]));
         (self.estimate, self.explorer) = (Some(good), None);
         self.servo(readings, errors, limits)
+    }
+
+    /// Moves to where quantities shall be.
+    pub(super) fn go_towards(&mut self, there: &[f64], readings: &[f64], limits: &LimitRows) {
+        let n = readings.len();
+        self.tasks[0].clear(n);
+        for (i, (there, here)) in there.iter().zip(readings).enumerate() {
+            self.tasks[0].push((0..n).map(|k| if k == i { 1.0 } else { 0.0 }), there - here, 1.0);
+        }
+        self.solve(limits);
     }
 
     fn solve(&mut self, limits: &LimitRows) {

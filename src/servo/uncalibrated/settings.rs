@@ -11,6 +11,9 @@ pub struct Settings {
     pub update: Update,
     /// Share by which slopes change per unit of motion [1 per unit of the quantities], at first; an adaptive update corrects it. Default 0.7.
     pub curvature: f64,
+    /// Where all trackers see whole pixels and errors are noise, places around are visited once, this far apart from the middle along each
+    /// direction, root mean square over the rows [px]: in between, pixels are then known. 0 for none. Default 1.
+    pub dither: f64,
     /// How far it is trusted; `None` takes every step whole.
     pub trust: Option<Trust>,
     /// Servoing stops where the sum of the absolute errors grows by more than this in one step [px]. Default 100, the thesis's.
@@ -67,7 +70,7 @@ pub struct Trust {
     /// Largest motion in one step, as the length of all quantities together [their unit]. Default 0.5.
     pub motion: f64,
     /// A step is shortened until errors grow by less than half of [`Settings::divergence`], even if the Jacobian is wrong by this many
-    /// standard deviations. Default 2.75.
+    /// standard deviations. Default 3.5.
     pub confidence: f64,
     /// Cost of the fourth power of a motion's length, as a share of the slopes' squares: long motions along directions that hardly
     /// show are avoided. Default 0.001.
@@ -81,6 +84,7 @@ impl Default for Settings {
             exploration: Exploration::default(),
             update: Update::default(),
             curvature: 0.7,
+            dither: 1.0,
             trust: Some(Trust::default()),
             divergence: 100.0,
             worst_condition: 3000.0,
@@ -136,6 +140,6 @@ impl Exploration {
 
 impl Default for Trust {
     fn default() -> Self {
-        Trust { motion: 0.5, confidence: 2.75, restraint: 0.001 }
+        Trust { motion: 0.5, confidence: 3.5, restraint: 0.001 }
     }
 }

@@ -1,6 +1,8 @@
-//! How far an estimated Jacobian is followed: a motion without limits, its damping, and the share of it that is safe.
+//! How far an estimated Jacobian is followed: a motion without limits, its damping, the share of it that is safe, and what is tried where no
+//! motion helps.
 use super::estimate::{Estimate, dot};
 use super::settings::Trust;
+use nalgebra::DMatrix;
 
 /// The damped Gauss-Newton step of an estimate's rows; kept from step to step.
 #[derive(Clone, Debug, Default)]
@@ -18,10 +20,22 @@ pub(super) struct Aim {
     pivots: f64,
     /// Σ s² / σ² over the rows.
     slopes: f64,
+    /// Of each row, the error and what the step shall change it by [px].
+    changes: Vec<[f64; 2]>,
+}
+
+/// A share of a motion that is safe, and by how much the sum of the errors stays below what it may grow to, at most that sum [px].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Safe {
+    pub share: f64,
+    pub slack: f64,
 }
 
 /// Least damping, as a share of the largest diagonal entry of H.
 const LEAST: f64 = 1e-12;
+
+/// Standard deviations that a trial shall teach, in the mean over the rows.
+const CLEAR: f64 = 3.0;
 
 /// Steps of the search for a damping that suits the length of its motion: to 3 %.
 const SEARCH: usize = 5;
@@ -117,31 +131,74 @@ impl Aim {
     /// The share of `gain` times the motion that is safe, in (0, 1].
     ///
     /// With doubt p from the slopes' covariance and c from their curvature, the errors of the m rows sum up to at most
-    /// (1 - t λ) E + z √(m (t² p + t⁴ c)) after a share t; what that grows by shall be below `growth` [px].
-    pub fn share(&self, estimate: &Estimate, rows: &[usize], gain: f64, trust: &Trust, growth: f64) -> f64 {
+    /// Σ |e + t λ j·d| + z √(m (t² p + t⁴ c)) after a share t; what that grows by shall be below `growth` [px]. `middle`: whose slopes j are
+    /// those of the middle of the way, where a model knows them.
+    pub fn share(
+        &mut self,
+        estimate: &Estimate,
+        middle: Option<&Estimate>,
+        rows: &[usize],
+        gain: f64,
+        trust: &Trust,
+        growth: f64,
+    ) -> Safe {
         let length = gain * self.length();
         let longest = if length > trust.motion { trust.motion / length } else { 1.0 };
         let (mut doubt, mut bend, mut errors) = (0.0, 0.0, 0.0);
+        self.changes.clear();
         for &row in rows {
             doubt += estimate.doubt(row, &self.motion);
             bend += estimate.scale(row);
             errors += estimate.error(row).abs();
+            self.changes.push([estimate.error(row), gain * dot(middle.unwrap_or(estimate).slopes(row), &self.motion)]);
         }
         let m = rows.len() as f64;
         let doubt = m * gain * gain * doubt;
-        let bend = m * 0.25 * estimate.curvature.powi(2) * bend * length.powi(4);
-        let safe = |share: f64| {
+        let bend = m * gain.powi(4) * bend * estimate.bend(&self.motion);
+        let slack = |share: f64| {
             let wrong = trust.confidence * (share * share * doubt + share.powi(4) * bend).sqrt();
-            wrong <= share * gain * errors + growth
+            let there: f64 = self.changes.iter().map(|[error, change]| (error + share * change).abs()).sum();
+            errors + growth - there - wrong
         };
-        if safe(longest) {
-            return longest;
+        let whole = slack(longest);
+        if whole >= 0.0 {
+            return Safe { share: longest, slack: whole.min(errors) };
         }
         let (mut low, mut high) = (0.0, longest);
         for _ in 0..20 {
             let middle = 0.5 * (low + high);
-            if safe(middle) { low = middle } else { high = middle }
+            if slack(middle) >= 0.0 { low = middle } else { high = middle }
         }
-        low
+        Safe { share: low, slack: 0.0 }
+    }
+
+    /// A motion that is tried to learn from: along the direction whose slopes are least known beside what they are, as far as what it changes
+    /// tells them from noise, to the side where errors fall as far as known. `None` where that is farther than `longest`, or than errors may grow
+    /// by `slack` [px]: where slopes are well known, there is nothing to learn.
+    pub fn trial(
+        &self,
+        estimate: &Estimate,
+        rows: &[usize],
+        trust: &Trust,
+        longest: f64,
+        slack: f64,
+    ) -> Option<Vec<f64>> {
+        let n = self.motion.len();
+        // H + δ I = L Lᵀ; the largest of the eigenvalues of L⁻¹ P L⁻ᵀ, with P the sum of the slopes' covariances over the rows' variances.
+        let factor = DMatrix::from_fn(n, n, |i, k| if k <= i { self.factor[i * n + k] } else { 0.0 });
+        let mut doubts = DMatrix::zeros(n, n);
+        rows.iter().for_each(|&row| doubts += estimate.covariance(row) / estimate.variance(row));
+        let inverse = factor.try_inverse()?;
+        let eigen = (&inverse * &doubts * inverse.transpose()).symmetric_eigen();
+        let along = inverse.transpose() * eigen.eigenvectors.column(eigen.eigenvalues.imax());
+        let along = along.try_normalize(0.0)?;
+        let known = along.as_slice();
+        let growth = |&row: &usize| {
+            dot(estimate.slopes(row), known).abs() + trust.confidence * estimate.doubt(row, known).sqrt()
+        };
+        let growth: f64 = rows.iter().map(growth).sum();
+        let clear = CLEAR * (rows.len() as f64 / (along.transpose() * &doubts * &along)[(0, 0)]).sqrt();
+        let way = if dot(&self.gradient, known) < 0.0 { -clear } else { clear };
+        (clear <= longest.min(slack / growth)).then(|| known.iter().map(|along| way * along).collect())
     }
 }
