@@ -1,7 +1,7 @@
 //! Servoing without a rig: default settings beside a Jacobian that is kept, cameras carried around the target; and CPU time of one step.
 //!
-//! `cargo bench --bench uncalibrated -- [SCENES [PLACES]]`: scenes drawn beside the reconstructed one and that of round numbers, and
-//! places of the cameras in each.
+//! `cargo bench --bench uncalibrated -- [SCENES [PLACES]] [TRACKER...]`: scenes drawn beside the reconstructed one and that of round numbers,
+//! places of the cameras in each, and which trackers: all where none is named.
 //! `diverged` counts the runs whose errors grew by more than 100 px in a step, `kept` those with the Jacobian kept; `refused` those that were
 //! stopped with the reason that what is seen does not determine the motion. Iterations, image and 3D errors are ratios to those with the
 //! Jacobian kept, over the places where both arrive: mean over the rows, largest, and how many rows are above 1. A row is one scene,
@@ -26,6 +26,9 @@ const NONE: [f64; 2] = [1e-3, 1e-6];
 
 fn main() {
     let numbers: Vec<usize> = std::env::args().filter_map(|argument| argument.parse().ok()).collect();
+    let is_named = |(name, _): &&(&str, Tracker)| std::env::args().any(|argument| argument == *name);
+    let named: Vec<_> = TRACKERS.iter().filter(is_named).copied().collect();
+    let trackers = if named.is_empty() { TRACKERS.to_vec() } else { named };
     let scenes = numbers.first().copied().unwrap_or(4);
     let places = numbers.get(1).copied().unwrap_or(36);
     let drawn = (0..scenes as u64).map(|seed| Scene::drawn(seed).expect("the shipped arm"));
@@ -37,12 +40,12 @@ fn main() {
     let around = |scene: &Scene, tracker: Tracker, settings: &Settings| {
         carried_around(scene, tracker, settings, places, 1).expect("settings that may be")
     };
-    table(&scenes, &around, &|scene, tracker, gain, size| {
+    table(&scenes, &trackers, &around, &|scene, tracker, gain, size| {
         let settings = Settings { gain, exploration: Exploration::fixed(size), ..Settings::default() };
         around(scene, tracker, &settings)
     });
     println!("\nthe same with the exact Jacobian of every moment");
-    table(&scenes, &around, &|scene, tracker, gain, _| {
+    table(&scenes, &trackers, &around, &|scene, tracker, gain, _| {
         (0..places).map(|place| with_exact_jacobian(scene, tracker, gain, (place, places))).collect()
     });
     println!("\nthe same with the exact Jacobian and points seen exactly, where only the target is rounded");
@@ -60,12 +63,17 @@ fn main() {
 /// Runs around the target, of a scene, a tracker, a gain and the size of exploratory motions [rad].
 type Around<'a> = &'a dyn Fn(&Scene, Tracker, f64, f64) -> Vec<Run>;
 
-fn table(scenes: &[Scene], around: &dyn Fn(&Scene, Tracker, &Settings) -> Vec<Run>, ours: Around<'_>) {
+fn table(
+    scenes: &[Scene],
+    trackers: &[(&str, Tracker)],
+    around: &dyn Fn(&Scene, Tracker, &Settings) -> Vec<Run>,
+    ours: Around<'_>,
+) {
     println!(
         "{:8} {:>5} {:>9} {:>9} {:>9} {:>18} {:>18} {:>18} {:>13}",
         "tracker", "gain", "diverged", "refused", "kept", "iterations", "image error", "3D error", "reconstructed"
     );
-    for (name, tracker) in TRACKERS {
+    for &(name, tracker) in trackers {
         for gain in GAINS {
             let kept = |scene: &Scene, size: f64| around(scene, tracker, &Settings::plain(gain, size));
             let ours = |scene: &Scene, size: f64| ours(scene, tracker, gain, size);

@@ -101,6 +101,8 @@ fn trackers_that_are_lost_midway_leave_a_task_that_is_carried_out_or_a_reason() 
             .collect();
         let other = format!("[robot]\nstart = [0]\n[target]\njoints = [0]\n[tracker]\nfaults = [{text}]\n");
         scene.faults = Scene::parse(&other, "faults.toml", Path::new("")).unwrap().faults;
+        // 0.6 px may be left along what few trackers hardly show, which is more than 3.5 mm: the noise is what is left in the end.
+        scene.settings.settled = 5;
         let run = go(&scene);
         assert_limits(&scene, &run);
         let end = run.moments.last().unwrap();

@@ -162,6 +162,26 @@ fn errors_that_no_known_motion_removes_are_removed_by_one_that_is_tried() {
     assert!(image[0] < 1.02 * image[1], "{image:?} px");
 }
 
+/// Where things stand still, whole pixels are the same again and again.
+#[test]
+fn whole_pixels_tell_more_where_places_around_are_visited() {
+    let left = |seed: u64, tracker: Tracker, dither: f64| {
+        let settings = Settings { dither, ..Settings::default() };
+        let runs = carried_around(&Scene::drawn(seed).unwrap(), tracker, &settings, 36, 1).unwrap();
+        assert!(runs.iter().all(|run| run.stop.is_none()), "scene {seed}");
+        // Some end in another solution than the one that is meant.
+        let mut ends: Vec<f64> = runs.iter().map(|run| run.error_3d).collect();
+        ends.sort_by(f64::total_cmp);
+        0.5 * (ends[17] + ends[18])
+    };
+    let ratio = |seed: u64| left(seed, Tracker::Rounded, 1.2) / left(seed, Tracker::Rounded, 0.0);
+    let ratios: Vec<f64> = (0..8).map(ratio).collect();
+    assert!(mean(ratios.iter().copied()) < 0.92 && ratios.iter().all(|ratio| *ratio < 1.05), "{ratios:?}");
+    // What is no whole pixel is averaged without it.
+    let [with, without] = [1.2, 0.0].map(|dither| left(0, Tracker::Gaussian(0.2), dither));
+    assert_eq!(with, without);
+}
+
 #[test]
 fn two_views_at_about_a_right_angle_serve_best_and_one_point_of_view_is_refused_before_anything_moves() {
     let of = |first: f64, apart_deg: f64| {

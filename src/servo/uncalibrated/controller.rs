@@ -301,6 +301,6 @@ impl Uncalibrated {
         if self.dither.is_some() {
             return self.dither(readings, errors, limits);
         }
-        self.servo(readings, errors, limits)
+        self.servo(self.settings.gain, readings, errors, limits)
     }
 }

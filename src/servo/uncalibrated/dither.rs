@@ -1,6 +1,6 @@
 //! Dither: motions by which trackers of whole pixels tell more than a pixel.
 use super::controller::Uncalibrated;
-use super::estimate::{Estimate, dot};
+use super::estimate::Estimate;
 use super::settings::Settings;
 use super::signals::Phase;
 use crate::servo::LimitRows;
@@ -8,22 +8,24 @@ use nalgebra::DMatrix;
 
 /// Places around where errors are noise, which are visited once. Where things stand still, whole pixels are the same again and again; where they
 /// move by about a pixel, what rounding leaves out differs from place to place and is averaged, and slopes are learned where they matter.
+///
+/// A place lies to one or the other side along all directions at once: a two-level design, in which all directions are at right angles to each
+/// other and to the mean, and then the same places on the other side of the middle, so that what bends evenly does not tilt slopes.
 pub(super) struct Dither {
     start: Vec<f64>,
-    /// From the start to the places, the next one last.
-    offsets: Vec<Vec<f64>>,
+    /// From the one that shows most to the one that shows least, and how far to go along each.
+    directions: Vec<(Vec<f64>, f64)>,
+    /// Of each place that is left, whether it is on the other side along each direction; the next one is last.
+    left: Vec<Vec<bool>>,
+    /// Where it is going to, and steps since.
+    there: Option<Vec<f64>>,
+    waits: usize,
     /// Readings and errors where it has been.
     visited: Vec<(Vec<f64>, Vec<f64>)>,
-    waits: usize,
-    /// By how much the errors may grow at the places [px].
-    growth: f64,
 }
 
-/// Errors may grow by this share of [`Settings::divergence`] along each direction, and along all.
-const GROWTH: f64 = 0.4;
-
-/// How far the first place is, as a share of the others.
-const FIRST: f64 = 0.5;
+/// Errors may grow by this share of [`Settings::divergence`] along each direction.
+const GROWTH: f64 = 0.3;
 
 /// How near a place must be, as a share of the way to it from the start, and steps that it is waited for.
 const NEAR: f64 = 0.1;
@@ -31,59 +33,48 @@ const PATIENCE: usize = 20;
 
 impl Dither {
     /// Around where quantities are, by [`Settings::dither`] along each of the directions of what some rows show; `None` where they are not found.
-    ///
-    /// A place lies to one or the other side along all directions at once: a two-level design of as many places as the next power of two,
-    /// in which all directions are at right angles to each other and to the mean. The first place is half as far, and the others are nearer
-    /// where errors grow there by more than they should.
     pub fn new(settings: &Settings, estimate: &Estimate, rows: &[usize], at: &[f64]) -> Option<Self> {
         let n = at.len();
-        let slopes = DMatrix::from_fn(rows.len(), n, |i, k| estimate.slopes(rows[i])[k]);
-        let shown = slopes.svd(false, true);
+        let shown = DMatrix::from_fn(rows.len(), n, |i, k| estimate.slopes(rows[i])[k]).svd(false, true);
+        let wanted = settings.dither * (rows.len() as f64).sqrt();
+        let sizes = shown.singular_values.iter().map(|shows| (wanted / shows).min(settings.exploration.largest));
         let directions = shown.v_t?;
-        let confidence = settings.trust.map_or(0.0, |trust| trust.confidence);
-        let motion = |i: usize| {
-            let along: Vec<f64> = directions.row(i).iter().copied().collect();
-            let growth = |&row: &usize| {
-                dot(estimate.slopes(row), &along).abs() + confidence * estimate.doubt(row, &along).sqrt()
-            };
-            let growth: f64 = rows.iter().map(growth).sum();
-            let wanted = settings.dither * (rows.len() as f64).sqrt() / shown.singular_values[i];
-            let size = wanted.min(GROWTH * settings.divergence / growth).min(settings.exploration.largest);
-            along.iter().map(|along| size * along).collect()
-        };
-        let motions: Vec<Vec<f64>> = (0..n).map(motion).collect();
+        let directions = directions.row_iter().map(|along| along.iter().copied().collect()).zip(sizes).collect();
         let places = (n + 1).next_power_of_two();
-        let offset = |place: usize| {
-            let side = |i: usize| if ((i + 1) & place).count_ones().is_multiple_of(2) { 1.0 } else { -1.0 };
-            (0..n).map(|k| (0..n).map(|i| side(i) * motions[i][k]).sum()).collect()
-        };
-        let mut offsets: Vec<Vec<f64>> = (0..places).rev().map(offset).collect();
-        offsets.iter_mut().last()?.iter_mut().for_each(|offset| *offset *= FIRST);
-        let growth = GROWTH * settings.divergence;
-        Some(Dither { start: at.to_vec(), offsets, visited: Vec::new(), waits: 0, growth })
+        let side = |place: usize, i: usize| !((i + 1) & place).count_ones().is_multiple_of(2);
+        let sides = |other: bool| (0..places).map(move |place| (0..n).map(|i| side(place, i) ^ other).collect());
+        let left = sides(true).rev().chain(sides(false).rev()).collect();
+        Some(Dither { start: at.to_vec(), directions, left, there: None, waits: 0, visited: Vec::new() })
     }
 
-    /// Takes in what is seen where things are now; the next place to go to, or `None` after the last.
-    fn next(&mut self, at: &[f64], errors: &[f64]) -> Option<Vec<f64>> {
-        let place = |offset: &Vec<f64>| self.start.iter().zip(offset).map(|(start, offset)| start + offset).collect();
-        if let Some(offset) = self.offsets.last().filter(|_| !self.visited.is_empty()) {
-            let there: Vec<f64> = place(offset);
-            let away: f64 = there.iter().zip(at).map(|(there, here)| (there - here).powi(2)).sum();
+    /// Takes in what is seen where things are now; the next place to go to, or `None` after the last. Places are nearer where errors may grow by too
+    /// much along a direction, which is known better with each of them.
+    fn next(
+        &mut self,
+        settings: &Settings,
+        estimate: &Estimate,
+        rows: &[usize],
+        (at, errors): (&[f64], &[f64]),
+    ) -> Option<Vec<f64>> {
+        if let Some(there) = &self.there {
+            let square = |a: &[f64]| a.iter().zip(there).map(|(a, there)| (a - there).powi(2)).sum::<f64>();
             self.waits += 1;
-            if away > NEAR * NEAR * dot(offset, offset) && self.waits < PATIENCE {
-                return Some(there);
+            if square(at) > NEAR * NEAR * square(&self.start) && self.waits < PATIENCE {
+                return Some(there.clone());
             }
-            self.offsets.pop();
         }
         self.visited.push((at.to_vec(), errors.to_vec()));
         self.waits = 0;
-        if let [(_, start), (_, first)] = &self.visited[..] {
-            let change = |(start, now): (&f64, &f64)| Some(now.abs() - start.abs()).filter(|change| change.is_finite());
-            let grown: f64 = start.iter().zip(first).filter_map(change).sum();
-            let share = (self.growth * FIRST / grown.max(f64::MIN_POSITIVE)).min(1.0);
-            self.offsets.iter_mut().flatten().for_each(|offset| *offset *= share);
+        let sides = self.left.pop()?;
+        let confidence = settings.trust.map_or(0.0, |trust| trust.confidence);
+        let mut there = self.start.clone();
+        for ((along, wanted), is_other) in self.directions.iter().zip(sides) {
+            let size = wanted.min(GROWTH * settings.divergence / estimate.reach(rows, along, confidence));
+            let way = if is_other { -size } else { size };
+            there.iter_mut().zip(along).for_each(|(there, along)| *there += way * along);
         }
-        self.offsets.last().map(place)
+        self.there = Some(there.clone());
+        Some(there)
     }
 
     /// Errors where things are now and their slopes, from all places by least squares: per row, with the covariance of each over its noise.
@@ -98,16 +89,16 @@ impl Dither {
 }
 
 impl Uncalibrated {
-    /// Goes to the next place. After the last, errors and slopes are what all of them say.
+    /// Goes to the next place. After the last, errors and slopes are what all of them say, and a whole step is made by them.
     pub(super) fn dither(&mut self, readings: &[f64], errors: &[f64], limits: &LimitRows) -> Phase {
         let (Some(mut dither), Some(estimate)) = (self.dither.take(), &mut self.estimate) else {
             return Phase::Exploring;
         };
         let is_seen = |(_, before): &(Vec<f64>, Vec<f64>)| self.seen.iter().all(|row| before[*row].is_finite());
         if !dither.visited.iter().all(is_seen) {
-            return self.servo(readings, errors, limits);
+            return self.servo(self.settings.gain, readings, errors, limits);
         }
-        if let Some(there) = dither.next(readings, errors) {
+        if let Some(there) = dither.next(&self.settings, estimate, &self.seen, (readings, errors)) {
             self.dither = Some(dither);
             self.go_towards(&there, readings, limits);
             return Phase::Exploring;
@@ -118,6 +109,7 @@ impl Uncalibrated {
                 estimate.relearn(row, &state, &covariance);
             }
         }
-        self.servo(readings, errors, limits)
+        // All that is to be seen here was seen: what is left is taken away at once.
+        self.servo(1.0, readings, errors, limits)
     }
 }

@@ -151,6 +151,12 @@ impl Estimate {
         motion.iter().enumerate().map(|(i, motion)| motion * along(i)).sum()
     }
 
+    /// Up to how much some rows' errors change by a motion, in sum [px]: by slopes, and as many standard deviations of what is not known of them.
+    pub(super) fn reach(&self, rows: &[usize], motion: &[f64], confidence: f64) -> f64 {
+        let of = |&row: &usize| dot(self.slopes(row), motion).abs() + confidence * self.doubt(row, motion).sqrt();
+        rows.iter().map(of).sum()
+    }
+
     /// Condition number of the slopes over the rows' standard deviations.
     pub fn condition(&self) -> f64 {
         let scaled = DMatrix::from_fn(self.len(), self.n, |row, i| self.slopes(row)[i] / self.variances[row].sqrt());
@@ -176,12 +182,13 @@ impl Estimate {
         if count > 0.0 { sum / count } else { 1.0 }
     }
 
-    /// Directions of unit length at right angles to each other, from the one that shows most in some rows to the one that shows least;
-    /// `None` where they are not found.
-    pub(super) fn directions(&self, rows: &[usize]) -> Option<Vec<Vec<f64>>> {
+    /// Directions of unit length at right angles to each other, from the one that shows most in some rows to the one that shows least, each with
+    /// what it shows: root mean square of the slopes along it over the rows' standard deviations. `None` where they are not found.
+    pub(super) fn directions(&self, rows: &[usize]) -> Option<Vec<(Vec<f64>, f64)>> {
         let scaled = |i: usize, k: usize| self.slopes(rows[i])[k] / self.variances[rows[i]].sqrt();
-        let found = DMatrix::from_fn(rows.len(), self.n, scaled).svd(false, true).v_t?;
-        Some(found.row_iter().map(|direction| direction.iter().copied().collect()).collect())
+        let found = DMatrix::from_fn(rows.len(), self.n, scaled).svd(false, true);
+        let shows = found.singular_values.iter().map(|value| value / (rows.len() as f64).sqrt());
+        Some(found.v_t?.row_iter().map(|direction| direction.iter().copied().collect()).zip(shows).collect())
     }
 
     /// Variance by which a row's target wanders in a step [px²].

@@ -8,8 +8,9 @@ use nalgebra::{DMatrix, DVector};
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Explorer {
     directions: Vec<Vec<f64>>,
-    /// How far there is room along each.
+    /// How far there is room along each, and how far the first motion goes.
     rooms: Vec<f64>,
+    sizes: Vec<f64>,
     /// Where it started, and the errors there [px].
     start: Vec<f64>,
     errors: Vec<f64>,
@@ -25,6 +26,9 @@ pub(super) struct Explorer {
     missing: usize,
     dropped: Vec<bool>,
 }
+
+/// Standard deviations of what is seen that a motion need not exceed where slopes are known: they are then known to 5 %.
+const CLEAR: f64 = 30.0;
 
 /// How near a waypoint must be, as a share of the motion to it.
 const NEAR: f64 = 0.05;
@@ -64,39 +68,47 @@ impl Explorer {
         };
         let directions =
             if settings.directions.is_empty() { (0..n).map(one).collect() } else { settings.directions.clone() };
-        Self::along(directions, settings.size, quantities, at, errors)
+        let sizes = vec![settings.size; directions.len()];
+        Self::along((directions, sizes), quantities, at, errors)
     }
 
-    /// To both sides along each of some directions, as far as there is room: what bends evenly then cancels. Where there is none along one of
-    /// them, as [`Explorer::new`].
+    /// To both sides along each of some directions, as far as there is room: what bends evenly then cancels. No farther than it takes to tell what
+    /// is seen from noise, as far as known from [`Estimate::directions`]. Where there is no room along one of them, as [`Explorer::new`].
     pub fn to_both_sides(
-        directions: &[Vec<f64>],
+        directions: &[(Vec<f64>, f64)],
         settings: &Exploration,
         quantities: &[Quantity],
         at: &[f64],
         errors: &[f64],
     ) -> Self {
-        let mut sides = Vec::new();
-        for along in directions {
-            let before = sides.len();
+        let (mut sides, mut sizes) = (Vec::new(), Vec::new());
+        for (along, shows) in directions {
+            let size = settings.size.min(CLEAR / shows);
             let both = [1.0, -1.0].map(|way| along.iter().map(|a| way * a).collect::<Vec<f64>>());
-            sides.extend(both.into_iter().filter(|along| room(along, quantities, at) >= settings.size));
-            if sides.len() == before {
+            sides.extend(both.into_iter().filter(|along| room(along, quantities, at) >= size));
+            if sides.len() == sizes.len() {
                 return Explorer::new(settings, quantities, at, errors);
             }
+            sizes.resize(sides.len(), size);
         }
-        Self::along(sides, settings.size, quantities, at, errors)
+        Self::along((sides, sizes), quantities, at, errors)
     }
 
-    fn along(directions: Vec<Vec<f64>>, size: f64, quantities: &[Quantity], at: &[f64], errors: &[f64]) -> Self {
+    fn along(
+        (directions, sizes): (Vec<Vec<f64>>, Vec<f64>),
+        quantities: &[Quantity],
+        at: &[f64],
+        errors: &[f64],
+    ) -> Self {
         Explorer {
             rooms: directions.iter().map(|along| room(along, quantities, at)).collect(),
+            size: sizes.first().copied().unwrap_or(0.0),
             directions,
+            sizes,
             start: at.to_vec(),
             errors: errors.to_vec(),
             motions: Vec::new(),
             changes: Vec::new(),
-            size,
             slack: quantities.iter().map(|quantity| quantity.dead_band.powi(2)).sum::<f64>().sqrt(),
             waits: 0,
             missing: 0,
@@ -146,7 +158,7 @@ impl Explorer {
             return Next::Failed("a tracker was lost while exploring".to_owned());
         }
         let clarity = clarity(&change, rows, &self.dropped);
-        let largest = settings.largest.min(self.rooms[k].max(settings.size));
+        let largest = settings.largest.min(self.rooms[k].max(self.sizes[k]));
         if clarity < settings.clarity && self.size < largest {
             // As far as it takes, judged by what was seen so far; at most four times as far, as that may be noise.
             let factor = (1.2 * settings.clarity / clarity).clamp(1.5, 4.0);
@@ -154,7 +166,7 @@ impl Explorer {
         } else {
             self.motions.push(motion);
             self.changes.push(change);
-            self.size = settings.size;
+            self.size = self.sizes.get(k + 1).copied().unwrap_or(self.size);
         }
         self.waits = 1;
         Next::Towards(self.waypoint())

@@ -54,13 +54,14 @@ impl Uncalibrated {
                 self.seen.retain(|row| !self.dropped.contains(row));
                 self.seen.iter().for_each(|&row| estimate.reset(row, errors[row]));
                 self.estimate = Some(*estimate);
-                self.servo(readings, errors, limits)
+                self.servo(self.settings.gain, readings, errors, limits)
             }
             Next::Failed(reason) => self.has_not_found_out(reason, readings, errors, limits),
         }
     }
 
-    pub(super) fn servo(&mut self, readings: &[f64], errors: &[f64], limits: &LimitRows) -> Phase {
+    /// Takes away a share of the errors, as far as that is safe.
+    pub(super) fn servo(&mut self, gain: f64, readings: &[f64], errors: &[f64], limits: &LimitRows) -> Phase {
         let n = readings.len();
         let Some(estimate) = &mut self.estimate else { return Phase::Exploring };
         let restraint = self.settings.trust.map_or(0.0, |trust| trust.restraint);
@@ -82,7 +83,7 @@ impl Uncalibrated {
             Some(ahead) => ahead.refine(estimate, readings, &self.seen, longest, &mut self.aim),
             None => None,
         };
-        let mut share = self.settings.gain;
+        let mut share = gain;
         let mut slack = 0.0;
         if let Some(trust) = &self.settings.trust {
             let safe = self.aim.share(estimate, middle, &self.seen, share, trust, 0.5 * self.settings.divergence);
@@ -175,7 +176,7 @@ impl Uncalibrated {
     fn go_back_to(&mut self, mut good: Estimate, readings: &[f64], errors: &[f64], limits: &LimitRows) -> Phase {
         self.seen.iter().for_each(|&row| good.reset(row, errors[row]));
         (self.estimate, self.explorer) = (Some(good), None);
-        self.servo(readings, errors, limits)
+        self.servo(self.settings.gain, readings, errors, limits)
     }
 
     /// Moves to where quantities shall be.

@@ -12,7 +12,7 @@ pub struct Settings {
     /// Share by which slopes change per unit of motion [1 per unit of the quantities], at first; an adaptive update corrects it. Default 0.7.
     pub curvature: f64,
     /// Where all trackers see whole pixels and errors are noise, places around are visited once, this far apart from the middle along each
-    /// direction, root mean square over the rows [px]: in between, pixels are then known. 0 for none. Default 1.
+    /// direction, root mean square over the rows [px]: in between, pixels are then known. 0 for none. Default 1.2.
     pub dither: f64,
     /// How far it is trusted; `None` takes every step whole.
     pub trust: Option<Trust>,
@@ -69,8 +69,8 @@ pub enum Update {
 pub struct Trust {
     /// Largest motion in one step, as the length of all quantities together [their unit]. Default 0.5.
     pub motion: f64,
-    /// A step is shortened until errors grow by less than half of [`Settings::divergence`], even if the Jacobian is wrong by this many
-    /// standard deviations. Default 3.5.
+    /// A step is shortened until errors grow by less than half of [`Settings::divergence`], and fall by a part of what they should where that
+    /// is much, even if the Jacobian is wrong by this many standard deviations. Default 3.5.
     pub confidence: f64,
     /// Cost of the fourth power of a motion's length, as a share of the slopes' squares: long motions along directions that hardly
     /// show are avoided. Default 0.001.
@@ -84,7 +84,7 @@ impl Default for Settings {
             exploration: Exploration::default(),
             update: Update::default(),
             curvature: 0.7,
-            dither: 1.0,
+            dither: 1.2,
             trust: Some(Trust::default()),
             divergence: 100.0,
             worst_condition: 3000.0,
@@ -107,6 +107,7 @@ impl Settings {
             gain,
             exploration: Exploration::fixed(size),
             update: Update::Keep,
+            dither: 0.0,
             trust: None,
             worst_condition: f64::INFINITY,
             ..Settings::default()

@@ -37,6 +37,9 @@ const LEAST: f64 = 1e-12;
 /// Standard deviations that a trial shall teach, in the mean over the rows.
 const CLEAR: f64 = 3.0;
 
+/// Share of a large fall of the errors that may be lost.
+const PAYS: f64 = 0.6;
+
 /// Steps of the search for a damping that suits the length of its motion: to 3 %.
 const SEARCH: usize = 5;
 
@@ -130,9 +133,9 @@ impl Aim {
 
     /// The share of `gain` times the motion that is safe, in (0, 1].
     ///
-    /// With doubt p from the slopes' covariance and c from their curvature, the errors of the m rows sum up to at most
-    /// Σ |e + t λ j·d| + z √(m (t² p + t⁴ c)) after a share t; what that grows by shall be below `growth` [px]. `middle`: whose slopes j are
-    /// those of the middle of the way, where a model knows them.
+    /// With doubt p from the slopes' covariance and c from their curvature, the sum of the m rows' errors after a share t is wrong by at most
+    /// z √(m (t² p + t⁴ c)). That shall be below `growth` [px] and what Σ |e + t λ j·d| falls by; of a large fall only a part counts, as a
+    /// Jacobian that is wrong promises too much. `middle`: whose slopes j are those of the middle of the way, where a model knows them.
     pub fn share(
         &mut self,
         estimate: &Estimate,
@@ -158,7 +161,8 @@ impl Aim {
         let slack = |share: f64| {
             let wrong = trust.confidence * (share * share * doubt + share.powi(4) * bend).sqrt();
             let there: f64 = self.changes.iter().map(|[error, change]| (error + share * change).abs()).sum();
-            errors + growth - there - wrong
+            let fall = errors - there;
+            growth + fall.min(2.0 * growth + PAYS * fall) - wrong
         };
         let whole = slack(longest);
         if whole >= 0.0 {
@@ -193,10 +197,7 @@ impl Aim {
         let along = inverse.transpose() * eigen.eigenvectors.column(eigen.eigenvalues.imax());
         let along = along.try_normalize(0.0)?;
         let known = along.as_slice();
-        let growth = |&row: &usize| {
-            dot(estimate.slopes(row), known).abs() + trust.confidence * estimate.doubt(row, known).sqrt()
-        };
-        let growth: f64 = rows.iter().map(growth).sum();
+        let growth = estimate.reach(rows, known, trust.confidence);
         let clear = CLEAR * (rows.len() as f64 / (along.transpose() * &doubts * &along)[(0, 0)]).sqrt();
         let way = if dot(&self.gradient, known) < 0.0 { -clear } else { clear };
         (clear <= longest.min(slack / growth)).then(|| known.iter().map(|along| way * along).collect())
