@@ -25,7 +25,7 @@ pub(super) struct Dither {
 }
 
 /// Errors may grow by this share of [`Settings::divergence`] along each direction.
-const GROWTH: f64 = 0.3;
+const GROWTH: f64 = 0.25;
 
 /// How near a place must be, as a share of the way to it from the start, and steps that it is waited for.
 const NEAR: f64 = 0.1;

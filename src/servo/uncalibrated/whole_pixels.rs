@@ -90,7 +90,8 @@ mod tests {
     fn whole_pixels_are_told_from_others_by_how_they_change() {
         let mut whole = WholePixels::new(4);
         // Against a target that is not whole; seen to a tenth; at rest; lost at times.
-        let at = |i: usize| [17.3 - i as f64, 0.1 * i as f64, 5.0, if i % 3 == 0 { f64::NAN } else { i as f64 }];
+        let at =
+            |i: usize| [17.3 - i as f64, 0.1 * i as f64, 5.0, if i.is_multiple_of(3) { f64::NAN } else { i as f64 }];
         for i in 0..12 {
             whole.take_in(&at(i), &at(i + 1));
             assert_eq!(whole.are_of(0), i >= 3);
