@@ -27,7 +27,7 @@ pub(super) struct Dither {
 /// Errors may grow by this share of [`Settings::divergence`] along each direction.
 const GROWTH: f64 = 0.25;
 
-/// How near a place must be, as a share of the way to it from the start, and steps that it is waited for.
+/// How near a place must be, as a share of the way to it from the start, and steps that it is waited for before it is the last.
 const NEAR: f64 = 0.1;
 const PATIENCE: usize = 20;
 
@@ -61,6 +61,9 @@ impl Dither {
             self.waits += 1;
             if square(at) > NEAR * NEAR * square(&self.start) && self.waits < PATIENCE {
                 return Some(there.clone());
+            }
+            if self.waits >= PATIENCE {
+                self.left.clear();
             }
         }
         self.visited.push((at.to_vec(), errors.to_vec()));

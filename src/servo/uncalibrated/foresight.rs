@@ -1,6 +1,7 @@
 //! What a model, right or outdated, says of the errors before anything has moved.
 use super::estimate::{Estimate, dot};
 use super::trust::Aim;
+use crate::rig::Limits;
 use nalgebra::DMatrix;
 
 /// A model of rows of errors: the rig as it once was learned. It may be wrong; what is measured corrects it.
@@ -37,6 +38,9 @@ struct Prediction {
 /// Steps towards the motion that a curved model asks for, and the change below which there are no more of them, as a share of it.
 const STEPS: usize = 8;
 const SETTLED: f64 = 1e-3;
+
+/// A motion that is asked for may take this many of the longest that are made.
+const FAR: f64 = 2.0;
 
 impl Ahead {
     pub fn new(model: Box<dyn Foresight>) -> Self {
@@ -75,12 +79,12 @@ impl Ahead {
     }
 
     /// Follows the model from its own solution, or from the first-order motion of `aim`, to the motion that leaves no error which a motion could
-    /// remove, and puts it into `aim`. The slopes that are returned are those of the middle of the way, of which that motion is the solution.
-    /// `None` where the model leads nowhere, or farther than `longest`.
+    /// remove, and puts it into `aim`; to one that `limits` allow, where there is one. The slopes that are returned are those of the middle of
+    /// the way, of which that motion is the solution. `None` where the model leads nowhere, or much farther than `longest`.
     pub fn refine(
         &mut self,
         estimate: &Estimate,
-        at: &[f64],
+        (at, limits): (&[f64], &[Limits]),
         rows: &[usize],
         longest: f64,
         aim: &mut Aim,
@@ -88,12 +92,20 @@ impl Ahead {
         let away = |there: Vec<f64>| there.iter().zip(at).map(|(there, at)| there - at).collect::<Vec<f64>>();
         let solution = self.model.solution(at).filter(|solution| solution.len() == at.len());
         let starts = [solution.map(away), Some(aim.motion.clone())];
-        let mut best: Option<(f64, Vec<f64>)> = None;
+        let is_outside = |motion: &[f64]| {
+            let mut all = at.iter().zip(motion).zip(limits);
+            all.any(|((at, motion), limits)| {
+                limits.lower.is_some_and(|lower| at + motion < lower)
+                    || limits.upper.is_some_and(|upper| at + motion > upper)
+            })
+        };
+        let mut best: Option<((bool, f64), Vec<f64>)> = None;
         for start in starts.into_iter().flatten() {
-            if let Some((cost, motion)) = self.follow(estimate, at, rows, longest, start)
-                && best.as_ref().is_none_or(|(least, _)| cost < *least)
-            {
-                best = Some((cost, motion));
+            if let Some((cost, motion)) = self.follow(estimate, at, rows, longest, start) {
+                let rank = (is_outside(&motion), cost);
+                if best.as_ref().is_none_or(|(least, _)| rank < *least) {
+                    best = Some((rank, motion));
+                }
             }
         }
         let (_, motion) = best?;
@@ -126,7 +138,7 @@ impl Ahead {
             }
             motion.iter_mut().zip(&self.aim.motion).for_each(|(motion, more)| *motion += more);
             let square = dot(&motion, &motion);
-            if square.is_nan() || square > longest * longest {
+            if square.is_nan() || square > (FAR * longest).powi(2) {
                 return None;
             }
             if dot(&self.aim.motion, &self.aim.motion) <= SETTLED * SETTLED * square {

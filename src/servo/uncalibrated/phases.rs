@@ -80,7 +80,7 @@ impl Uncalibrated {
         let removable = self.aim.removable();
         let longest = self.settings.trust.map_or(f64::INFINITY, |trust| trust.motion);
         let middle = match &mut self.ahead {
-            Some(ahead) => ahead.refine(estimate, readings, &self.seen, longest, &mut self.aim),
+            Some(ahead) => ahead.refine(estimate, (readings, &self.limits), &self.seen, longest, &mut self.aim),
             None => None,
         };
         let mut share = gain;
