@@ -4,7 +4,7 @@ use handeye::Error;
 use handeye::infer::{Names, Sighting};
 use handeye::rig::{Rig, catalog};
 use handeye::servo::limits::TipSpeed;
-use handeye::servo::uncalibrated::{Foresight, Phase, Quantity, Row, Settings, Uncalibrated};
+use handeye::servo::uncalibrated::{Foresight, Phase, Quantity, Row, Settings, Trust, Uncalibrated};
 use handeye::servo::{
     Command, Controller, Limit, LimitRows, LoopSettings, Measurement, ModelBased, ServoLoop, Stop, Takes,
     UncalibratedJoints,
@@ -145,6 +145,21 @@ fn a_true_rig_leads_there_as_fast_as_model_based_and_an_outdated_one_much_faster
     assert!(truly.len() >= by_model.len() && mean(&truly) <= mean(&by_model));
     assert!(moved.len() >= 95, "{} of {count}", moved.len());
     assert!(mean(&moved) <= 0.5 * mean(&without));
+}
+
+/// The longest step is 2 rad here, the way 3.04 rad, and what pixels alone ask for ends 30 px off at the limits of the joints.
+#[test]
+fn a_true_rig_leads_to_a_solution_that_is_farther_than_one_step_goes() {
+    let rig = random_rig(6, 2, 12, 69);
+    let options = SimulateOptions { samples: 2, seed: 69, in_view: 1.0, ..SimulateOptions::default() };
+    let samples = simulate(&rig, &options).unwrap().truth.samples;
+    let [start, target] = [0, 1].map(|index| samples[index].joints.clone().unwrap());
+    let mut world = World::new(&rig, &start, noisy(69)).unwrap();
+    let trust = Settings::with_rig().trust.map(|trust| Trust { motion: 2.0, ..trust });
+    let settings = Settings { trust, ..Settings::with_rig() };
+    let controller = UncalibratedJoints::with_rig(&rig, PIXELS, settings).unwrap();
+    let end = run(&mut world, &rig, controller, &target, &[], 1e-9);
+    assert!(matches!(end.stop, Stop::Converged { .. }), "{:?} after {} commands", end.stop, end.commands);
 }
 
 #[test]
