@@ -40,8 +40,9 @@ const CLEAR: f64 = 3.0;
 /// Share of a large fall of the errors that may be lost.
 const PAYS: f64 = 0.6;
 
-/// Steps of the search for a damping that suits the length of its motion: to 3 %.
+/// Steps of the search for a damping that suits the length of its motion: to 3 %. A length that hardly changes, as a share, ends it.
 const SEARCH: usize = 5;
+const SETTLED: f64 = 1e-3;
 
 impl Aim {
     /// Minimises |J d + e|² + ½ c Σs² |d|⁴ over the rows, which are divided by their standard deviations; c is the restraint. False where
@@ -64,7 +65,11 @@ impl Aim {
                 if !self.solve(n, self.damping) {
                     return false;
                 }
-                length = (length * self.length()).sqrt();
+                let reached = self.length();
+                if (reached - length).abs() <= SETTLED * length {
+                    break;
+                }
+                length = (length * reached).sqrt();
             }
         }
         true
