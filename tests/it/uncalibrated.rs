@@ -182,6 +182,15 @@ fn whole_pixels_tell_more_where_places_around_are_visited() {
     assert_eq!(with, without);
 }
 
+/// After 0.5 rad slopes along what hardly shows have changed by 8 standard deviations, and the errors are said to fall by 400 px.
+#[test]
+fn what_a_wrong_jacobian_promises_is_not_taken_for_sure() {
+    let settings = Settings { gain: 1.0, exploration: Exploration::fixed(2_f64.to_radians()), ..Settings::default() };
+    let runs = carried_around(&Scene::drawn(4).unwrap(), Tracker::Rounded, &settings, 360, 1).unwrap();
+    let diverged: Vec<usize> = (0..360).filter(|place| runs[*place].diverged()).collect();
+    assert!(diverged.is_empty(), "{diverged:?}");
+}
+
 #[test]
 fn two_views_at_about_a_right_angle_serve_best_and_one_point_of_view_is_refused_before_anything_moves() {
     let of = |first: f64, apart_deg: f64| {
@@ -315,6 +324,64 @@ fn where_exploring_anew_shows_nothing_servoing_goes_on_with_what_was_known() {
     assert!(explorations >= 1);
     let away = (world.at[0] - world.target[0]).hypot(world.at[1] - world.target[1]);
     assert!(away < 1e-3, "{away} from where the errors are least");
+}
+
+#[test]
+fn exploring_anew_goes_no_farther_than_tells_what_is_seen_from_noise() {
+    let mut world = Linear::new(0.0);
+    let settings = Settings { exploration: Exploration::fixed(0.2), ..Settings::default() };
+    let mut controller = world.controller(settings, Limits::default());
+    let [a, b] = [0, 1].map(|k| Vector3::from_fn(|row, _| world.jacobian[row][k]));
+    let beside = 20.0 * a.cross(&b).normalize();
+    let (mut has_servoed, mut farthest) = (false, 0.0_f64);
+    for _ in 0..60 {
+        let errors: Vec<f64> = world.errors().iter().zip(beside.iter()).map(|(error, more)| error + more).collect();
+        let command = controller.step(&world.at, &errors, &none(2), 1.0).unwrap();
+        let (is_exploring, motion) = (command.phase == &Phase::Exploring, command.motion.to_vec());
+        has_servoed |= !is_exploring;
+        if has_servoed && is_exploring {
+            farthest = farthest.max(motion[0].hypot(motion[1]));
+        }
+        world.carry_out(&motion);
+    }
+    // 30 times 0.1 px by 190 px per unit or more, and from one side to the other.
+    assert!(farthest > 0.0 && farthest < 0.04, "{farthest}");
+}
+
+/// Visits of places where errors are whole pixels: how many steps they take, and how far from the target the last place and the step after it are.
+fn dithered(held_at: f64) -> (usize, [f64; 2]) {
+    let mut world = Linear::new(0.0);
+    let rows = vec![Row { sd: 0.4, camera: 0 }; 3];
+    let settings = Settings { gain: 0.25, ..Settings::default() };
+    let mut servo = Uncalibrated::new(world.quantities(Limits::default()), rows, settings).unwrap();
+    let (mut has_servoed, mut steps, mut ends) = (false, 0, [0.0; 2]);
+    for _ in 0..300 {
+        let errors: Vec<f64> = world.errors().iter().map(|error| error.round()).collect();
+        let command = servo.step(&world.at, &errors, &none(2), 1.0).unwrap();
+        let (is_exploring, motion) = (command.phase == &Phase::Exploring, command.motion.to_vec());
+        let was_dithering = steps > 0;
+        has_servoed |= !is_exploring;
+        steps += usize::from(has_servoed && is_exploring);
+        let away = |world: &Linear| (world.at[0] - world.target[0]).hypot(world.at[1] - world.target[1]);
+        let before = away(&world);
+        world.carry_out(&motion);
+        world.at[0] = world.at[0].min(held_at);
+        if was_dithering && !is_exploring {
+            ends = [before, away(&world)];
+            break;
+        }
+    }
+    (steps, ends)
+}
+
+#[test]
+fn places_around_are_visited_once_each_and_given_up_where_one_is_out_of_reach() {
+    // Two directions: 4 places and their mirror images. From the last, one step takes away what is known to be left, whatever the gain.
+    let (steps, [last, after]) = dithered(f64::INFINITY);
+    assert_eq!(steps, 8);
+    assert!(after < 0.5 * last, "{last} from the target, {after} a step later");
+    let (steps, _) = dithered(0.4002);
+    assert!((20..=30).contains(&steps), "{steps} steps");
 }
 
 #[test]

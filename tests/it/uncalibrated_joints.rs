@@ -2,7 +2,7 @@
 use crate::servo_loop::goal;
 use handeye::Error;
 use handeye::infer::{Names, Sighting};
-use handeye::rig::{Rig, catalog};
+use handeye::rig::{Limits, Rig, catalog};
 use handeye::servo::limits::TipSpeed;
 use handeye::servo::uncalibrated::{Foresight, Phase, Quantity, Row, Settings, Trust, Uncalibrated};
 use handeye::servo::{
@@ -398,6 +398,42 @@ fn a_model_that_says_nothing_of_use_gives_way_to_exploring_and_one_that_is_wrong
         }
         assert!(at.iter().all(|at| at.abs() < 2e-3), "case {case}: {at:?}");
         assert!(explored || !explores, "case {case}");
+    }
+}
+
+/// Errors are 200 (q² - 1): there are two solutions.
+struct Parabola;
+
+impl Foresight for Parabola {
+    fn predict(&mut self, at: &[f64], errors: &mut Vec<f64>, slopes: &mut Vec<f64>) {
+        (*errors, *slopes) = (vec![200.0 * (at[0] * at[0] - 1.0); 2], vec![400.0 * at[0]; 2]);
+    }
+
+    fn solution(&mut self, _: &[f64]) -> Option<Vec<f64>> {
+        Some(vec![-1.0])
+    }
+
+    fn doubts(&mut self, _: &[f64], errors: &[f64]) -> Vec<DMatrix<f64>> {
+        vec![DMatrix::identity(1, 1); errors.len()]
+    }
+}
+
+#[test]
+fn a_model_leads_to_the_solution_that_the_limits_allow_and_not_to_a_nearer_one_beyond() {
+    for (upper, end) in [(None, 1.0), (Some(0.5), -1.0)] {
+        let quantity = Quantity { limits: Limits { upper, ..Limits::default() }, ..Quantity::default() };
+        let rows = vec![Row { sd: 0.1, camera: 0 }, Row { sd: 0.1, camera: 1 }];
+        let mut servo = Uncalibrated::new(vec![quantity], rows, Settings::with_rig()).unwrap();
+        servo.begin_with_model(Box::new(Parabola));
+        let mut limits = LimitRows::default();
+        limits.clear(1);
+        let mut at = 0.3;
+        for _ in 0..20 {
+            let (mut errors, mut slopes) = (Vec::new(), Vec::new());
+            Parabola.predict(&[at], &mut errors, &mut slopes);
+            at += servo.step(&[at], &errors, &limits, 1.0).unwrap().motion[0];
+        }
+        assert!((at - end).abs() < 1e-3, "{at}, and {end} is inside an upper limit of {upper:?}");
     }
 }
 

@@ -1,6 +1,6 @@
 //! Dither: motions by which trackers of whole pixels tell more than a pixel.
 use super::controller::Uncalibrated;
-use super::estimate::Estimate;
+use super::estimate::{Estimate, dot};
 use super::settings::Settings;
 use super::signals::Phase;
 use crate::servo::LimitRows;
@@ -35,11 +35,12 @@ impl Dither {
     /// Around where quantities are, by [`Settings::dither`] along each of the directions of what some rows show; `None` where they are not found.
     pub fn new(settings: &Settings, estimate: &Estimate, rows: &[usize], at: &[f64]) -> Option<Self> {
         let n = at.len();
-        let shown = DMatrix::from_fn(rows.len(), n, |i, k| estimate.slopes(rows[i])[k]).svd(false, true);
-        let wanted = settings.dither * (rows.len() as f64).sqrt();
-        let sizes = shown.singular_values.iter().map(|shows| (wanted / shows).min(settings.exploration.largest));
-        let directions = shown.v_t?;
-        let directions = directions.row_iter().map(|along| along.iter().copied().collect()).zip(sizes).collect();
+        let with_size = |(along, _): (Vec<f64>, f64)| {
+            let squares: f64 = rows.iter().map(|&row| dot(estimate.slopes(row), &along).powi(2)).sum();
+            let size = settings.dither / (squares / rows.len() as f64).sqrt();
+            (along, size.min(settings.exploration.largest))
+        };
+        let directions = estimate.directions(rows)?.into_iter().map(with_size).collect();
         let places = (n + 1).next_power_of_two();
         let side = |place: usize, i: usize| !((i + 1) & place).count_ones().is_multiple_of(2);
         let sides = |other: bool| (0..places).map(move |place| (0..n).map(|i| side(place, i) ^ other).collect());

@@ -37,8 +37,8 @@ const LEAST: f64 = 1e-12;
 /// Standard deviations that a trial shall teach, in the mean over the rows.
 const CLEAR: f64 = 3.0;
 
-/// Share of a large fall of the errors that may be lost.
-const PAYS: f64 = 0.6;
+/// Share that is sure of what a motion takes away, where that is much.
+const SURE: f64 = 0.6;
 
 /// Steps of the search for a damping that suits the length of its motion: to 3 %. A length that hardly changes, as a share, ends it.
 const SEARCH: usize = 5;
@@ -139,8 +139,8 @@ impl Aim {
     /// The share of `gain` times the motion that is safe, in (0, 1].
     ///
     /// With doubt p from the slopes' covariance and c from their curvature, the sum of the m rows' errors after a share t is wrong by at most
-    /// z √(m (t² p + t⁴ c)). That shall be below `growth` [px] and what Σ |e + t λ j·d| falls by; of a large fall only a part counts, as a
-    /// Jacobian that is wrong promises too much. `middle`: whose slopes j are those of the middle of the way, where a model knows them.
+    /// z √(m (t² p + t⁴ c)). That shall be below `growth` [px] and what Σ |e + t λ j·d| falls by, f; of a large fall only 2 `growth` and
+    /// 0.6 f count, as a Jacobian that is wrong promises too much. `middle`: whose slopes j are those of the middle of the way, where a model knows them.
     pub fn share(
         &mut self,
         estimate: &Estimate,
@@ -167,7 +167,7 @@ impl Aim {
             let wrong = trust.confidence * (share * share * doubt + share.powi(4) * bend).sqrt();
             let there: f64 = self.changes.iter().map(|[error, change]| (error + share * change).abs()).sum();
             let fall = errors - there;
-            growth + fall.min(2.0 * growth + PAYS * fall) - wrong
+            growth + fall.min(2.0 * growth + SURE * fall) - wrong
         };
         let whole = slack(longest);
         if whole >= 0.0 {
