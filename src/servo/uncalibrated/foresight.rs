@@ -94,7 +94,10 @@ impl Ahead {
         let starts = [solution.map(away), Some(aim.motion.clone())];
         let is_outside = |motion: &[f64]| {
             let mut all = at.iter().zip(motion).zip(limits);
-            all.any(|((at, motion), limits)| limits.exclude(at + motion))
+            all.any(|((at, motion), limits)| {
+                limits.lower.is_some_and(|lower| at + motion < lower)
+                    || limits.upper.is_some_and(|upper| at + motion > upper)
+            })
         };
         let mut best: Option<((bool, f64), Vec<f64>)> = None;
         for start in starts.into_iter().flatten() {
